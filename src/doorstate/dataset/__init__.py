@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Prepared clouds on disk: strata, splits, batches."""

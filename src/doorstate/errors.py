@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Everything that can go wrong for a user, as one tree; the command line is the only catcher.
+
+DoorstateError
+├── CloudError             one input file or array cannot be used
+│   ├── CloudReadError     unreadable, truncated, unknown format
+│   └── CloudContentError  readable, but empty, all NaN, too few points, wrong units
+├── CameraError            intrinsics or depth settings missing or impossible
+├── ConfigError            an option or experiment file asks for something that does not exist
+├── DatasetError           a data set folder is missing, incomplete or inconsistent
+├── RunError               a training run or comparison folder cannot be used or continued
+├── WeightsError           a weights file is missing, damaged, or made for something else
+└── MissingExtraError      an optional package is needed and not installed
+"""
+
+from __future__ import annotations
+
+
+class DoorstateError(Exception):
+    """Root of the tree; `str(error)` is one line that says what was wrong, where, and what to do."""
+
+
+class CloudError(DoorstateError):
+    """One input file or array cannot be used."""
+
+
+class CloudReadError(CloudError):
+    """The bytes could not be read as a cloud."""
+
+
+class CloudContentError(CloudError):
+    """The cloud was read, but holds nothing a door's state can be told from."""
+
+
+class CameraError(DoorstateError):
+    """Camera intrinsics, depth scale or roll are missing or impossible."""
+
+
+class ConfigError(DoorstateError):
+    """An option or experiment file asks for something that does not exist."""
+
+
+class DatasetError(DoorstateError):
+    """A data set folder is missing, incomplete or inconsistent."""
+
+
+class RunError(DoorstateError):
+    """A training run or comparison folder cannot be used or continued."""
+
+
+class WeightsError(DoorstateError):
+    """A weights file is missing, damaged, or made for another network."""
+
+
+class MissingExtraError(DoorstateError):
+    """An optional package is needed and not installed."""
