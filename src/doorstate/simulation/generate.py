@@ -1,0 +1,224 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From a seed to manifest rows, and from a row back to its frame, bit for bit."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field
+
+from doorstate.clouds.depth import depth_to_points
+from doorstate.errors import ConfigError
+from doorstate.simulation.placement import draw_heading_rad, half_ring, reduced_ring
+from doorstate.simulation.scene import Door, build_scene
+from doorstate.simulation.sensor import CameraPose, DepthCamera, Render, cut_range, render
+from doorstate.types import DoorState, Part, Points
+
+_SAME_IMAGE_M = 1e-4
+
+
+class Preset(BaseModel):
+    """What a data set draws its scenes from; opening angles in degrees, one range per state."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    name: str
+    angles_deg: dict[Literal["closed", "semi_open", "open"], tuple[float, float]]
+    door: Door = Door()
+    camera: DepthCamera = DepthCamera()
+    camera_height_m: float = Field(default=1.0, gt=0.0, lt=2.5)
+
+
+_RANGES: dict[Literal["closed", "semi_open", "open"], tuple[float, float]] = {
+    "closed": (0.0, 3.0),
+    "semi_open": (15.0, 65.0),
+    "open": (75.0, 115.0),
+}
+PRESETS = {
+    "ogurob": Preset(name="ogurob", angles_deg=_RANGES),
+    "ogurob-fixed": Preset(
+        name="ogurob-fixed", angles_deg={"closed": (0.0, 0.0), "semi_open": (45.0, 45.0), "open": (90.0, 90.0)}
+    ),
+}
+
+
+class SampleRow(BaseModel):
+    """One line of the manifest; scene and camera columns rebuild the frame, the others describe it.
+
+    Poses are in the door frame (simulation.scene) but for `door_*`, which is the door frame in the sensor frame.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    sample_id: str
+    pose_id: str
+    state: Literal["closed", "semi_open", "open"]
+    opening_angle_deg: float
+    x_m: float
+    y_m: float
+    camera_height_m: float
+    heading_deg: float
+    pitch_deg: float = 0.0
+    seed: int
+    door: Door
+    camera: DepthCamera
+    distance_m: float
+    robot_angle_deg: float
+    door_x_m: float
+    door_y_m: float
+    door_z_m: float
+    door_yaw_deg: float
+    measured_px: int = 0
+    visible_leaf_px: int = 0
+    visible_frame_px: int = 0
+    visible_opening_px: int = 0
+    same_image_as: str = ""
+    depth_sha256: str = ""
+
+
+class Frame(NamedTuple):
+    """A replayed sample."""
+
+    full: Render  # before the range cut: what a colour camera would see
+    cut: Render  # what the depth camera reports
+    points: Points  # (H, W, 3) metres, gravity-aligned sensor frame
+
+
+def draw_pose(preset: Preset, seed: int, index: int) -> list[SampleRow]:
+    """The three samples of one pose, drawn and not yet rendered.
+
+    Draws depend on (seed, position index, state) alone, so any order or sharding gives the same rows.
+    """
+    position = half_ring()[index]
+    heading_rad = draw_heading_rad(position, seed, index)
+    # The camera's own frame has the door at R(-heading) (door - camera).
+    door_x = -position.x_m * math.cos(heading_rad) - position.y_m * math.sin(heading_rad)
+    door_y = position.x_m * math.sin(heading_rad) - position.y_m * math.cos(heading_rad)
+    rows = []
+    for state in DoorState:
+        low, high = preset.angles_deg[state.label]  # type: ignore[index]
+        angle_deg = float(np.random.default_rng([seed, index, int(state)]).uniform(low, high))
+        rows.append(
+            SampleRow(
+                sample_id=f"p{index:04d}-{state.label}",
+                pose_id=f"p{index:04d}",
+                state=state.label,  # type: ignore[arg-type]
+                opening_angle_deg=angle_deg,
+                x_m=position.x_m,
+                y_m=position.y_m,
+                camera_height_m=preset.camera_height_m,
+                heading_deg=math.degrees(heading_rad),
+                seed=seed,
+                door=preset.door,
+                camera=preset.camera,
+                distance_m=round(math.hypot(position.x_m, position.y_m), 9),
+                robot_angle_deg=round(math.degrees(math.atan2(position.row, position.column)), 9),
+                door_x_m=door_x,
+                door_y_m=door_y,
+                door_z_m=-preset.camera_height_m,
+                door_yaw_deg=math.degrees(math.remainder(-heading_rad, 2 * math.pi)),
+            )
+        )
+    return rows
+
+
+def replay(row: SampleRow) -> Frame:
+    """Rebuild the frame of a manifest row, bit for bit."""
+    pose = CameraPose(
+        row.x_m, row.y_m, row.camera_height_m, math.radians(row.heading_deg), math.radians(row.pitch_deg)
+    )
+    intrinsics = row.camera.intrinsics()
+    full = render(build_scene(row.door, math.radians(row.opening_angle_deg)), pose, intrinsics)
+    cut = cut_range(full, row.camera)
+    points = depth_to_points(cut.depth_m, intrinsics)
+    return Frame(full, cut, level(points, pose.pitch_rad))
+
+
+def level(points: Points, pitch_rad: float) -> Points:
+    """Turn points of a pitched camera (positive looks down) back to a level sensor frame; (..., 3) metres."""
+    if not pitch_rad:
+        return points
+    cos, sin = math.cos(pitch_rad), math.sin(pitch_rad)
+    x, y, z = points[..., 0], points[..., 1], points[..., 2]
+    return np.stack([cos * x + sin * z, y, cos * z - sin * x], axis=-1).astype(np.float32)
+
+
+def simulate_pose(preset: Preset, seed: int, index: int) -> tuple[list[SampleRow], list[Frame]]:
+    """Draw and render the three samples of one pose and fill in what can be seen of the door."""
+    rows = draw_pose(preset, seed, index)
+    frames = [replay(row) for row in rows]
+    filled = []
+    for row, frame in zip(rows, frames, strict=True):
+        twins = [
+            other.state
+            for other, other_frame in zip(rows, frames, strict=True)
+            if other.state != row.state and _same_image(frame.cut.depth_m, other_frame.cut.depth_m)
+        ]
+        part = frame.cut.part
+        filled.append(
+            row.model_copy(
+                update={
+                    "measured_px": int((part != Part.NONE).sum()),
+                    "visible_leaf_px": int((part == Part.LEAF).sum()),
+                    "visible_frame_px": int((part == Part.FRAME).sum()),
+                    "visible_opening_px": _opening_px(row, frame),
+                    "same_image_as": " ".join(twins),
+                    "depth_sha256": hashlib.sha256(frame.cut.depth_m.tobytes()).hexdigest(),
+                }
+            )
+        )
+    return filled, frames
+
+
+def pose_indices(poses: int | None) -> list[int]:
+    """Which positions a data set of `poses` positions uses; None is all 1353.
+
+    Raises:
+        ConfigError: more positions than there are, or none.
+    """
+    if poses is None:
+        return list(range(len(half_ring())))
+    try:
+        return reduced_ring(poses)
+    except ValueError as error:
+        raise ConfigError(f"--poses {poses}: {error}") from error
+
+
+def find_preset(name: str) -> Preset:
+    """A preset by name.
+
+    Raises:
+        ConfigError: no such preset.
+    """
+    if name not in PRESETS:
+        raise ConfigError(f"no preset {name!r}: choose one of {', '.join(PRESETS)}")
+    return PRESETS[name]
+
+
+def _same_image(one: NDArray[np.float32], other: NDArray[np.float32]) -> bool:
+    measured = ~np.isnan(one)
+    return bool(
+        np.array_equal(measured, ~np.isnan(other))
+        and np.abs(one[measured] - other[measured]).max(initial=0.0) <= _SAME_IMAGE_M
+    )
+
+
+def _opening_px(row: SampleRow, frame: Frame) -> int:
+    """Pixels that look into the opening: their ray meets its rectangle on the robot's wall face, and nothing before."""
+    door, heading = row.door, math.radians(row.heading_deg)
+    depth = frame.full.depth_m
+    intrinsics = row.camera.intrinsics()
+    # A unit-depth point per pixel, in the gravity-aligned sensor frame, is the ray's direction.
+    ray = level(depth_to_points(np.ones_like(depth), intrinsics), math.radians(row.pitch_deg))
+    ray_y = math.sin(heading) * ray[..., 0] + math.cos(heading) * ray[..., 1]
+    ray_x = math.cos(heading) * ray[..., 0] - math.sin(heading) * ray[..., 1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        reach = -row.y_m / ray_y
+        inside = np.abs(row.x_m + reach * ray_x) < door.opening_width_m / 2
+        z = row.camera_height_m + reach * ray[..., 2]
+        inside &= (reach > 0) & (z > 0) & (z < door.opening_height_m)
+        return int((inside & (depth >= reach - _SAME_IMAGE_M)).sum())
