@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What every network offers: logits, the features before its head, and its own training loss."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import ClassVar
+
+from torch import Tensor, nn
+from torch.nn import functional
+
+from doorstate.errors import CloudContentError
+from doorstate.networks.ops import at_least_float32
+
+
+class PointNetwork(nn.Module, ABC):
+    """Classifier of point clouds stored in farthest-point order.
+
+    Deviation: no network samples centres. Points arrive in farthest-point order, so the first M of them
+    are what farthest point sampling from point 0 would choose; representative points are prefixes too.
+    """
+
+    min_points: ClassVar[int] = 128
+    """Fewest points per cloud."""
+    feature_size: int
+    """Channels of `features`."""
+    head: nn.Module
+    """From features to logits."""
+
+    @abstractmethod
+    def features(self, points: Tensor) -> Tensor:
+        """(B, F) global features of (B, N, 3) points."""
+
+    def forward(self, points: Tensor) -> Tensor:
+        """Classify clouds.
+
+        Args:
+            points: (B, N, 3) centred coordinates in farthest-point order, N >= `min_points`.
+
+        Returns:
+            (B, num_classes) logits, float32 also under autocast.
+
+        Raises:
+            CloudContentError: The points have another shape, or there are too few.
+        """
+        self.check(points)
+        return at_least_float32(self.head(self.features(points)))
+
+    def training_loss(
+        self, points: Tensor, labels: Tensor, label_smoothing: float = 0.0
+    ) -> tuple[Tensor, Tensor]:
+        """Loss the network is trained with.
+
+        Args:
+            points: (B, N, 3) as in `forward`.
+            labels: (B,) int64 classes.
+            label_smoothing: eps of 1 - eps + eps/C for the true class and eps/C for each other of C classes.
+                (The 1 - eps and eps/(C - 1) of DGCNN's authors is the same with eps * C/(C - 1).)
+
+        Returns:
+            Scalar loss and (B, num_classes) logits.
+        """
+        logits = self(points)
+        return functional.cross_entropy(logits, labels, label_smoothing=label_smoothing), logits
+
+    def check(self, points: Tensor) -> None:
+        """Raise CloudContentError unless points are (B, N, 3) with enough points."""
+        if points.dim() != 3 or points.shape[-1] != 3 or points.shape[1] < self.min_points:
+            raise CloudContentError(
+                f"points have shape {tuple(points.shape)}: "
+                f"pass (batch, points, 3) with at least {self.min_points} points"
+            )
