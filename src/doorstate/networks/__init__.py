@@ -1,1 +1,45 @@
 # SPDX-License-Identifier: Apache-2.0
+"""Five classifiers of point clouds, by name."""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from typing import Any
+
+from doorstate.errors import ConfigError
+from doorstate.networks.base import PointNetwork
+from doorstate.networks.pointnet import PointNet
+from doorstate.networks.pointnet2 import PointNet2
+
+NETWORKS: dict[str, type[PointNetwork]] = {
+    "pointnet": PointNet,
+    "pointnet2": PointNet2,
+}
+
+
+def list_networks() -> list[str]:
+    """Names that `create_network` knows."""
+    return list(NETWORKS)
+
+
+def create_network(name: str, num_classes: int = 3, **options: Any) -> PointNetwork:
+    """Build an untrained network.
+
+    Args:
+        name: one of `list_networks()`.
+        num_classes: number of logits.
+        options: keyword arguments of the network's class.
+
+    Raises:
+        ConfigError: Unknown name or option.
+    """
+    if name not in NETWORKS:
+        close = get_close_matches(name, NETWORKS, n=1)
+        hint = f"did you mean {close[0]!r}?" if close else f"known are {', '.join(NETWORKS)}"
+        raise ConfigError(f"there is no network {name!r}: {hint}")
+    network = NETWORKS[name]
+    known = network.__init__.__kwdefaults__ or {}
+    for option in options:
+        if option not in known:
+            raise ConfigError(f"network {name!r} has no option {option!r}: known are {', '.join(known)}")
+    return network(num_classes, **options)

@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: Apache-2.0
+"""PointNet: shared dense layers, two learned alignments, one maximum (Qi et al., 2017, arXiv:1612.00593)."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from doorstate.networks.base import PointNetwork
+from doorstate.networks.layers import DenseMax, PointMLP, classification_head, dense, set_batchnorm
+from doorstate.networks.ops import at_least_float32, full_precision
+
+
+class TransformNet(nn.Module):
+    """T-Net: predicts a square matrix for a whole cloud, exactly the identity before training."""
+
+    def __init__(self, size: int) -> None:
+        super().__init__()
+        self.size = size
+        self.trunk = PointMLP(0, (64, 128)) if size == 3 else nn.Sequential(dense(size, 64), dense(64, 128))
+        self.pool = DenseMax(128, 1024)
+        self.dense = nn.Sequential(dense(1024, 512), dense(512, 256))
+        self.output = nn.Linear(256, size * size)
+        nn.init.zeros_(self.output.weight)
+        nn.init.zeros_(self.output.bias)
+
+    def forward(self, rows: Tensor) -> Tensor:
+        """(B, size, size) transform, full precision, of (B, N, size) rows."""
+        code = at_least_float32(self.dense(self.pool(self.trunk(rows))))  # (B, 256)
+        with full_precision(code):
+            residual = self.output(code).view(-1, self.size, self.size)
+        transform: Tensor = residual + torch.eye(self.size, dtype=residual.dtype, device=residual.device)
+        return transform
+
+
+class PointNet(PointNetwork):
+    """PointNet with input and feature transform.
+
+    Args:
+        num_classes: number of logits.
+        regularizer_weight: of the feature transform's distance from an orthogonal matrix.
+        batchnorm_eps: epsilon of every batch normalisation; 1e-3 in the original.
+    """
+
+    feature_size = 1024
+
+    def __init__(
+        self, num_classes: int = 3, *, regularizer_weight: float = 0.001, batchnorm_eps: float = 1e-5
+    ) -> None:
+        super().__init__()
+        self.regularizer_weight = regularizer_weight
+        self.input_transform = TransformNet(3)
+        self.local = PointMLP(0, (64, 64))
+        self.feature_transform = TransformNet(64)
+        self.encoder = nn.Sequential(dense(64, 64), dense(64, 128), DenseMax(128, 1024))
+        self.head = classification_head(self.feature_size, num_classes, dropout=0.3)
+        set_batchnorm(self, eps=batchnorm_eps)
+
+    def features(self, points: Tensor) -> Tensor:
+        """(B, 1024) maximum over the points."""
+        return self._encode(points)[0]
+
+    def training_loss(
+        self, points: Tensor, labels: Tensor, label_smoothing: float = 0.0
+    ) -> tuple[Tensor, Tensor]:
+        """Cross entropy + weight/2 * sum over the batch of |A A^T - I|_F^2, A the feature transform.
+
+        A sum, not a mean, as TensorFlow's l2_loss in the original: its weight grows with the batch.
+        """
+        self.check(points)
+        features, transform = self._encode(points)
+        logits = at_least_float32(self.head(features))
+        loss = functional.cross_entropy(logits, labels, label_smoothing=label_smoothing)
+        return loss + self.regularizer_weight * orthogonality_penalty(transform), logits
+
+    def _encode(self, points: Tensor) -> tuple[Tensor, Tensor]:
+        """(B, 1024) features and the (B, 64, 64) feature transform."""
+        rotation = self.input_transform(points)  # (B, 3, 3)
+        with full_precision(points):
+            aligned = points @ rotation  # (B, N, 3)
+        rows = self.local(aligned)  # (B, N, 64)
+        transform = self.feature_transform(rows)  # (B, 64, 64)
+        return self.encoder(rows @ transform), transform
+
+
+def orthogonality_penalty(transform: Tensor) -> Tensor:
+    """Half the sum over the batch of |A A^T - I|_F^2 of (B, K, K) matrices, in full precision."""
+    with full_precision(transform):
+        identity = torch.eye(transform.shape[-1], dtype=transform.dtype, device=transform.device)
+        return 0.5 * (transform @ transform.mT - identity).square().sum()

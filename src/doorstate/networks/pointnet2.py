@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: Apache-2.0
+"""PointNet++: small PointNets on balls around ever fewer centres (Qi et al., 2017, arXiv:1706.02413)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import torch
+from torch import Tensor, nn
+
+from doorstate.errors import ConfigError
+from doorstate.networks.base import PointNetwork
+from doorstate.networks.layers import PooledMLP, classification_head, set_batchnorm
+from doorstate.networks.ops import ball_query, gather_rows
+
+
+class Scale(NamedTuple):
+    """One ball size of a level: its radius relative to the level's, slots for points, layer widths."""
+
+    relative_radius: float
+    num_samples: int
+    channels: tuple[int, ...]
+
+
+class Variant(NamedTuple):
+    """The two levels before everything is grouped, and the dropout rate of the head."""
+
+    levels: tuple[tuple[Scale, ...], tuple[Scale, ...]]
+    dropout: float
+
+
+VARIANTS = {
+    "ssg": Variant(((Scale(1, 32, (64, 64, 128)),), (Scale(1, 64, (128, 128, 256)),)), dropout=0.5),
+    "msg": Variant(
+        (
+            (Scale(0.5, 16, (32, 32, 64)), Scale(1, 32, (64, 64, 128)), Scale(2, 128, (64, 96, 128))),
+            (Scale(0.5, 32, (64, 64, 128)), Scale(1, 64, (128, 128, 256)), Scale(2, 128, (128, 128, 256))),
+        ),
+        dropout=0.6,  # the released code; the paper has 0.5
+    ),
+}
+
+
+class SetAbstraction(nn.Module):
+    """Centres with the pooled features of the balls around them, one ball per scale.
+
+    Args:
+        num_centres: the first points of the cloud serve as centres, all points if there are fewer.
+        radius: of a scale with relative radius 1.
+        scales: sizes and widths; the features of the scales are concatenated.
+        num_features: channels of the points' features.
+    """
+
+    def __init__(self, num_centres: int, radius: float, scales: Sequence[Scale], num_features: int) -> None:
+        super().__init__()
+        self.num_centres = num_centres
+        self.balls = [(radius * scale.relative_radius, scale.num_samples) for scale in scales]
+        self.mlps = nn.ModuleList([PooledMLP(num_features, scale.channels) for scale in scales])
+        self.out_channels = sum(scale.channels[-1] for scale in scales)
+
+    def forward(self, points: Tensor, features: Tensor | None) -> tuple[Tensor, Tensor]:
+        """(B, M, 3) centres and (B, M, out_channels) features of (B, N, 3) points and (B, N, F) features."""
+        centres = points[:, : self.num_centres]
+        pooled = []
+        for (radius, num_samples), mlp in zip(self.balls, self.mlps, strict=True):
+            indices = ball_query(centres, points, radius, num_samples)  # (B, M, K)
+            offsets = gather_rows(points, indices) - centres.unsqueeze(2)  # (B, M, K, 3)
+            pooled.append(mlp(offsets, features, indices))
+        return centres, torch.cat(pooled, dim=-1)
+
+
+class PointNet2(PointNetwork):
+    """PointNet++ for classification, with single-scale ("ssg") or multi-scale ("msg") grouping.
+
+    Args:
+        num_classes: number of logits.
+        variant: "ssg" or "msg".
+        radii: ball radius of the two levels, in the unit of the points; "msg" adds half and twice of each.
+        num_samples: points per ball of every scale instead of the variant's own numbers.
+        batchnorm_eps: epsilon of every batch normalisation; 1e-3 in the original.
+
+    Raises:
+        ConfigError: Unknown variant.
+    """
+
+    feature_size = 1024
+
+    def __init__(
+        self,
+        num_classes: int = 3,
+        *,
+        variant: str = "ssg",
+        radii: tuple[float, float] = (0.2, 0.4),
+        num_samples: int | None = None,
+        batchnorm_eps: float = 1e-5,
+    ) -> None:
+        super().__init__()
+        if variant not in VARIANTS:
+            raise ConfigError(f"pointnet2 has no variant {variant!r}: use one of {', '.join(VARIANTS)}")
+        levels, dropout = VARIANTS[variant]
+        first, second = (
+            [scale._replace(num_samples=num_samples or scale.num_samples) for scale in level]
+            for level in levels
+        )
+        self.level1 = SetAbstraction(512, radii[0], first, num_features=0)
+        self.level2 = SetAbstraction(128, radii[1], second, self.level1.out_channels)
+        self.level3 = PooledMLP(self.level2.out_channels, (256, 512, 1024))
+        self.head = classification_head(self.feature_size, num_classes, dropout)
+        set_batchnorm(self, eps=batchnorm_eps)
+
+    def features(self, points: Tensor) -> Tensor:
+        """(B, 1024) maximum over the centres of the second level, whose coordinates enter absolutely."""
+        centres, features = self.level1(points, None)
+        centres, features = self.level2(centres, features)
+        pooled: Tensor = self.level3(centres, features)
+        return pooled
