@@ -8,12 +8,16 @@ from typing import Any
 
 from doorstate.errors import ConfigError
 from doorstate.networks.base import PointNetwork
+from doorstate.networks.dgcnn import DGCNN
+from doorstate.networks.pointcnn import PointCNN
 from doorstate.networks.pointnet import PointNet
 from doorstate.networks.pointnet2 import PointNet2
 
 NETWORKS: dict[str, type[PointNetwork]] = {
     "pointnet": PointNet,
     "pointnet2": PointNet2,
+    "dgcnn": DGCNN,
+    "pointcnn": PointCNN,
 }
 
 

@@ -16,8 +16,28 @@ from doorstate.networks.ops import full_precision, gather_rows, max_over
 class RowBatchNorm(nn.BatchNorm1d):
     """Batch normalisation of channels over all rows of all clouds."""
 
+    momentum: float
+
     def forward(self, rows: Tensor) -> Tensor:
         return super().forward(rows.reshape(-1, self.num_features)).view(rows.shape)
+
+    def normalize(self, rows: Tensor, mean: Tensor, variance: Tensor, count: int) -> Tensor:
+        """Normalise with batch statistics found elsewhere, and let the running statistics follow them.
+
+        Args:
+            rows: (B, ..., C).
+            mean: (C,) of the batch.
+            variance: (C,) of the batch, divided by count.
+            count: number of rows the statistics are of.
+        """
+        assert self.running_mean is not None and self.running_var is not None  # noqa: PT018
+        assert self.num_batches_tracked is not None
+        with torch.no_grad():
+            self.num_batches_tracked += 1
+            self.running_mean.lerp_(mean, self.momentum)
+            self.running_var.lerp_(variance * (count / (count - 1)), self.momentum)
+        scale = self.weight * torch.rsqrt(variance + self.eps)
+        return (rows - mean) * scale + self.bias
 
 
 def set_batchnorm(network: nn.Module, eps: float | None = None, momentum: float | None = None) -> None:

@@ -7,9 +7,11 @@ Coordinates stay in full precision even under autocast; no gradient flows throug
 from __future__ import annotations
 
 from contextlib import AbstractContextManager, nullcontext
+from typing import Literal
 
 import torch
 from torch import Tensor
+from torch.nn import functional
 
 _QUERIES_PER_BLOCK = 512  # 8 MiB of distances per cloud of 4096 points: stays in cache
 
@@ -35,10 +37,31 @@ def gather_rows(values: Tensor, indices: Tensor) -> Tensor:
     Returns:
         (B, ..., C). Uses index_select on flattened rows: the backward of `values[indices]` is slow on CPUs.
     """
-    batch, num_rows, channels = values.shape
+    rows = _flat_rows(values, indices).reshape(-1)
+    return values.flatten(0, 1).index_select(0, rows).view(*indices.shape, values.shape[-1])
+
+
+def reduce_neighbours(values: Tensor, indices: Tensor, reduction: Literal["sum", "max"]) -> Tensor:
+    """Sum or maximum of each point's neighbours, without a tensor of all neighbours.
+
+    Args:
+        values: (B, N, C).
+        indices: (B, M, k) int64 row numbers within the same cloud.
+        reduction: "sum" or "max"; the gradient of a maximum goes to one neighbour.
+
+    Returns:
+        (B, M, C).
+    """
+    bags = _flat_rows(values, indices).flatten(0, 1)  # (B * M, k)
+    reduced = functional.embedding_bag(bags, values.flatten(0, 1), mode=reduction)
+    return reduced.view(*indices.shape[:2], values.shape[-1])
+
+
+def _flat_rows(values: Tensor, indices: Tensor) -> Tensor:
+    """Row numbers in the flattened batch: (B, ...) like the indices."""
+    batch, num_rows, _ = values.shape
     first_row = num_rows * torch.arange(batch, device=values.device)
-    rows = indices + first_row.view(-1, *[1] * (indices.dim() - 1))  # (B, ...)
-    return values.reshape(-1, channels).index_select(0, rows.reshape(-1)).view(*indices.shape, channels)
+    return indices + first_row.view(-1, *[1] * (indices.dim() - 1))
 
 
 def max_over(values: Tensor, dim: int) -> Tensor:

@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: Apache-2.0
+"""PointCNN: convolution after a learned reordering of each neighbourhood (Li et al., 2018, arXiv:1801.07791).
+
+Every layer is linear, then ELU, then batch normalisation, without bias except the logits'.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+from typing import NamedTuple
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from doorstate.networks.base import PointNetwork
+from doorstate.networks.layers import PointLinear, RowBatchNorm, set_batchnorm
+from doorstate.networks.ops import at_least_float32, full_precision, gather_rows, knn
+
+
+class Level(NamedTuple):
+    """One row of the original's table `modelnet_x3_l4`."""
+
+    k: int
+    dilation: int
+    num_representatives: int | None  # None: every point
+    channels: int
+
+
+LEVELS = (Level(8, 1, None, 48), Level(12, 2, 384, 96), Level(16, 2, 128, 192), Level(16, 3, 128, 384))
+
+
+def _elu_dense(linear: nn.Linear) -> nn.Sequential:
+    nn.init.xavier_normal_(linear.weight)
+    return nn.Sequential(linear, nn.ELU(), RowBatchNorm(linear.out_features))
+
+
+def _depthwise(rows: Tensor, weight: Tensor) -> Tensor:
+    """Contract the neighbours of each channel: (B, P, K, C) with weight (K, C, m) to (B, P, C, m)."""
+    return torch.einsum("bpkc,kcm->bpcm", rows, weight)
+
+
+def _depthwise_weight(k: int, channels: int, multiplier: int) -> nn.Parameter:
+    std = sqrt(2 / (k * channels + k * multiplier))  # Glorot-normal, fans counted as TensorFlow does
+    return nn.Parameter(torch.randn(k, channels, multiplier) * std)
+
+
+class XTransform(nn.Module):
+    """Predicts the X matrix of each neighbourhood from its coordinates."""
+
+    def __init__(self, k: int) -> None:
+        super().__init__()
+        self.k = k
+        self.linear = nn.Linear(3 * k, k * k, bias=False)
+        nn.init.normal_(self.linear.weight, std=sqrt(2 / (3 * k + k**3)))  # fans of a (1, K) kernel
+        self.depthwise1 = _depthwise_weight(k, k, k)
+        self.depthwise2 = _depthwise_weight(k, k, k)
+        self.norm0, self.norm1, self.norm2 = (RowBatchNorm(k * k) for _ in range(3))
+
+    def forward(self, offsets: Tensor) -> Tensor:
+        """(B, P, K, K) matrices of (B, P, K, 3) coordinates relative to the representative point."""
+        square = (*offsets.shape[:2], self.k, self.k)
+        with full_precision(offsets):
+            x = self.linear(offsets.flatten(2))  # (B, P, K * K)
+        x = self.norm0(functional.elu(x)).view(square)
+        # A depthwise step contracts one axis and puts a new one last: the two contract different axes.
+        x = self.norm1(functional.elu(_depthwise(x, self.depthwise1).flatten(2))).view(square)
+        matrices: Tensor = self.norm2(_depthwise(x, self.depthwise2).flatten(2)).view(square)
+        return matrices
+
+
+class XConv(nn.Module):
+    """X-Conv operator: from points with features to representative points with features."""
+
+    def __init__(self, level: Level, num_features: int, with_global: bool = False) -> None:
+        super().__init__()
+        self.k, self.dilation, self.num_representatives, channels = level
+        lifted = num_features // 4 if num_features else channels // 2
+        multiplier = -(-channels // num_features) if num_features else 4
+        self.lift = nn.Sequential(
+            _elu_dense(PointLinear(0, lifted, bias=False)), _elu_dense(nn.Linear(lifted, lifted, bias=False))
+        )
+        self.transform = XTransform(self.k)
+        self.depthwise = _depthwise_weight(self.k, lifted + num_features, multiplier)
+        self.pointwise = _elu_dense(nn.Linear((lifted + num_features) * multiplier, channels, bias=False))
+        self.position: nn.Module | None = None
+        self.out_channels = channels
+        if with_global:
+            quarter = channels // 4
+            self.position = nn.Sequential(
+                _elu_dense(PointLinear(0, quarter, bias=False)),
+                _elu_dense(nn.Linear(quarter, quarter, bias=False)),
+            )
+            self.out_channels += quarter
+
+    def neighbours(self, points: Tensor) -> Tensor:
+        """(B, P, K) every D-th of the nearest points of each representative, itself first."""
+        # Deviation: with fewer than K * D points the dilation shrinks, so that K neighbours remain.
+        dilation = min(self.dilation, points.shape[1] // self.k)
+        representatives = points[:, : self.num_representatives]
+        return knn(representatives, points, self.k * dilation)[..., ::dilation]
+
+    def forward(self, points: Tensor, features: Tensor | None) -> tuple[Tensor, Tensor]:
+        """Representatives (B, P, 3) and their features (B, P, out_channels), of (B, N, 3) and (B, N, F)."""
+        # Deviation: the first points in farthest-point order, not the first of a random permutation.
+        representatives = points[:, : self.num_representatives]
+        indices = self.neighbours(points)
+        offsets = gather_rows(points, indices) - representatives.unsqueeze(2)  # (B, P, K, 3)
+        rows = self.lift(offsets)  # (B, P, K, C_lift)
+        if features is not None:
+            rows = torch.cat([rows, gather_rows(features, indices)], dim=-1)  # (B, P, K, C_lift + F)
+        rows = self.transform(offsets) @ rows
+        out = self.pointwise(_depthwise(rows, self.depthwise).flatten(2))  # (B, P, channels)
+        if self.position is not None:
+            out = torch.cat([self.position(representatives), out], dim=-1)
+        return representatives, out
+
+
+class PointCNN(PointNetwork):
+    """PointCNN `x3_l4` on coordinates.
+
+    The representative points of the last level are classified one by one while training; their features are
+    averaged for one answer per cloud.
+
+    Args:
+        num_classes: number of logits.
+        dilations: D of the four levels.
+        num_representatives: P of the four levels, None for every point.
+        batchnorm_eps: epsilon of every batch normalisation; 1e-3 in the original.
+    """
+
+    feature_size = 192
+
+    def __init__(
+        self,
+        num_classes: int = 3,
+        *,
+        dilations: tuple[int, int, int, int] = (1, 2, 2, 3),
+        num_representatives: tuple[int | None, int | None, int | None, int | None] = (None, 384, 128, 128),
+        batchnorm_eps: float = 1e-5,
+    ) -> None:
+        super().__init__()
+        self.levels = nn.ModuleList()
+        num_features = 0
+        for level, dilation, count in zip(LEVELS, dilations, num_representatives, strict=True):
+            level = level._replace(dilation=dilation, num_representatives=count)
+            conv = XConv(level, num_features, with_global=len(self.levels) == 3)
+            self.levels.append(conv)
+            num_features = conv.out_channels
+        self.dense = nn.Sequential(
+            _elu_dense(nn.Linear(num_features, 384, bias=False)),
+            _elu_dense(nn.Linear(384, self.feature_size, bias=False)),
+            nn.Dropout(0.8),
+        )
+        self.head = nn.Linear(self.feature_size, num_classes)
+        nn.init.xavier_normal_(self.head.weight)
+        nn.init.zeros_(self.head.bias)
+        set_batchnorm(self, eps=batchnorm_eps)
+
+    def point_features(self, points: Tensor) -> Tensor:
+        """(B, P, 192) features of the representative points of the last level."""
+        self.check(points)
+        features = None
+        for level in self.levels:
+            points, features = level(points, features)
+        rows: Tensor = self.dense(features)
+        return rows
+
+    def features(self, points: Tensor) -> Tensor:
+        """(B, 192) mean of `point_features`."""
+        return at_least_float32(self.point_features(points)).mean(dim=1)
+
+    def point_logits(self, points: Tensor) -> Tensor:
+        """(B, P, num_classes) logits of the representative points of the last level."""
+        return at_least_float32(self.head(self.point_features(points)))
+
+    def training_loss(
+        self, points: Tensor, labels: Tensor, label_smoothing: float = 0.0
+    ) -> tuple[Tensor, Tensor]:
+        """Mean cross entropy of all representative points; the logits returned are their mean."""
+        logits = self.point_logits(points)  # (B, P, C)
+        tiled = labels.unsqueeze(1).expand(logits.shape[:2])  # (B, P)
+        loss = functional.cross_entropy(
+            logits.flatten(0, 1), tiled.flatten(), label_smoothing=label_smoothing
+        )
+        return loss, logits.mean(dim=1)
