@@ -46,20 +46,26 @@ def half_ring() -> list[Position]:
 
 
 def reduced_ring(count: int) -> list[int]:
-    """Indices into `half_ring()` of `count` positions spread evenly over it, by bearing and distance.
+    """Indices into `half_ring()` of `count` positions, spread over bearing and distance.
 
-    A golden-angle-like walk: positions are sorted by bearing and every k-th is kept, with ties between distances broken
-    by the distance, so that any count covers all regions and bands.
+    Every k-th position of the ring read sector by sector (30 degrees), near to far within each.
+
+    Raises:
+        ValueError: more positions than there are, or none.
     """
     positions = half_ring()
     if not 1 <= count <= len(positions):
         raise ValueError(f"there are {len(positions)} positions, not {count}")
     order = sorted(
         range(len(positions)),
-        key=lambda k: (math.atan2(positions[k].row, positions[k].column), math.hypot(*positions[k])),
+        key=lambda k: (_sector(positions[k]), math.hypot(*positions[k]), positions[k].column),
     )
     picks = np.linspace(0, len(order) - 1, count).round().astype(int)
     return sorted(order[pick] for pick in picks)
+
+
+def _sector(position: Position) -> int:
+    return int(math.degrees(math.atan2(position.row, position.column)) // 30)
 
 
 def draw_heading_rad(position: Position, seed: int, index: int) -> float:

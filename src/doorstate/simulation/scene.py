@@ -38,7 +38,7 @@ class Door(BaseModel):
     opening_width_m: float = 0.90
     opening_height_m: float = 2.10
     hinge: Hinge = "left"
-    swing: Swing = "away"
+    swing: Swing = "towards"
     leaf_thickness_m: float = 0.04
     leaf_gap_m: float = 0.003  # to the jambs and the head
     leaf_floor_gap_m: float = 0.006

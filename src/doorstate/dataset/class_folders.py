@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Labelled clouds as people keep them: one folder per state, in any usual spelling, with an optional CSV of poses."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from pathlib import Path
+
+from doorstate.clouds.io import find_clouds
+from doorstate.dataset.strata import distance_band, polar, region
+from doorstate.errors import DatasetError
+from doorstate.simulation.manifest import read_csv
+from doorstate.types import DoorState
+
+# Order matters: "semi-open" and "half closed" hold the other words too.
+_SPELLINGS = (
+    (DoorState.SEMI_OPEN, re.compile(r"semi|half|ajar|part(ly|ial)|aralik")),
+    (DoorState.CLOSED, re.compile(r"clos|shut|kapali")),
+    (DoorState.OPEN, re.compile(r"open|acik")),
+)
+_WORDS = re.compile(r"(semi|half|ajar|partly|partially|partial|opened|open|closed|close|shut|doors?|is|the|aralik|kapali|acik)+")
+
+
+def state_of_folder(name: str) -> DoorState | None:
+    """The state a folder's name spells, or None: `Semi-Open`, `semiopen_doors`, `01_closed`, `half open` all work."""
+    letters = re.sub(r"[^a-z]", "", name.lower())
+    if not _WORDS.fullmatch(letters):
+        return None
+    return next((state for state, spelling in _SPELLINGS if spelling.search(letters)), None)
+
+
+def labelled_rows(root: Path, poses_csv: Path | None = None) -> list[dict[str, str]]:
+    """One manifest row for every cloud under a class folder, with strata where its pose is known.
+
+    Args:
+        root: folder whose sub-folders, at any depth, are named after the states; the nearest one decides.
+        poses_csv: columns `file` (path below root, or the bare name) and either `x_m,y_m` (door frame) or
+            `distance_m,robot_angle_deg`; further columns are kept.
+
+    Raises:
+        DatasetError: no class folder, or the CSV lacks a column or names a file twice.
+    """
+    if not root.is_dir():
+        raise DatasetError(f"{root}: is not a folder")
+    poses = _read_poses(poses_csv) if poses_csv else {}
+    rows, unused = [], set(poses)
+    for path in find_clouds([root]):
+        relative = path.relative_to(root)
+        states = [state_of_folder(name) for name in (root.name, *relative.parts[:-1])]
+        state = next((found for found in reversed(states) if found is not None), None)
+        if state is None:
+            continue
+        row = {
+            "sample_id": relative.with_suffix("").as_posix(),
+            "state": state.label,
+            "file": relative.as_posix(),
+        }
+        key = next((k for k in (relative.as_posix(), relative.name) if k in poses), None)
+        if key:
+            row |= poses[key]
+            unused.discard(key)
+        rows.append(row)
+    if not rows:
+        raise DatasetError(
+            f"{root}: no clouds in folders named after the states (such as open, semi-open, closed)"
+        )
+    if unused:
+        raise DatasetError(f"{poses_csv}: {len(unused)} files are not in {root}, such as {sorted(unused)[0]!r}")
+    _disambiguate(rows)
+    return rows
+
+
+def _disambiguate(rows: list[dict[str, str]]) -> None:
+    # `door.pcd` and `door.ply` side by side are two samples.
+    uses = Counter(row["sample_id"] for row in rows)
+    for row in rows:
+        if uses[row["sample_id"]] > 1:
+            row["sample_id"] = row["file"]
+
+
+def _read_poses(path: Path) -> dict[str, dict[str, str]]:
+    poses: dict[str, dict[str, str]] = {}
+    for number, row in enumerate(read_csv(path), start=2):
+        name = row.pop("file", None)
+        if not name:
+            raise DatasetError(f"{path}: line {number} has no value in column 'file'")
+        if name in poses:
+            raise DatasetError(f"{path}: line {number} names {name!r} a second time")
+        for reserved in ("sample_id", "state"):
+            row.pop(reserved, None)
+        poses[name] = row | _strata(row, f"{path}: line {number}")
+    return poses
+
+
+def _strata(row: dict[str, str], where: str) -> dict[str, str]:
+    try:
+        if row.get("x_m") and row.get("y_m"):
+            distance_m, angle_deg = polar(float(row["x_m"]), float(row["y_m"]))
+            pose_id = row.get("pose_id") or f"{float(row['x_m']):.3f},{float(row['y_m']):.3f}"
+        elif row.get("distance_m") and row.get("robot_angle_deg"):
+            distance_m, angle_deg = float(row["distance_m"]), float(row["robot_angle_deg"])
+            pose_id = row.get("pose_id") or f"{distance_m:.3f},{angle_deg:.3f}"
+        else:
+            raise DatasetError(f"{where}: needs x_m and y_m, or distance_m and robot_angle_deg")
+    except ValueError as error:
+        raise DatasetError(f"{where}: {error}") from error
+    return {
+        "pose_id": pose_id,
+        "distance_m": str(distance_m),
+        "robot_angle_deg": str(angle_deg),
+        "distance_band": distance_band(distance_m),
+        "region": region(angle_deg),
+    }

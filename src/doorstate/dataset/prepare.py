@@ -1,0 +1,198 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From raw samples, simulated or somebody's files, to a prepared data set; resumable, several processes."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from doorstate import __version__
+from doorstate.clouds.io import ReadOptions, read_cloud
+from doorstate.clouds.preparation import NUM_POINTS, prepare_cloud
+from doorstate.dataset.class_folders import labelled_rows
+from doorstate.dataset.store import CLOUDS, DESCRIPTION, MANIFEST, PARTS, DatasetDescription, PreparedDataset, open_dataset
+from doorstate.dataset.strata import distance_band, region
+from doorstate.errors import CameraError, CloudContentError, CloudError, ConfigError, DatasetError
+from doorstate.files import atomic_path, write_text
+from doorstate.jobs import Progress, default_workers, no_progress, piece_paths, run_pieces
+from doorstate.simulation.generate import replay
+from doorstate.simulation.manifest import read_csv, unflatten, write_csv
+from doorstate.simulation.run import MANIFEST as SIMULATED_MANIFEST
+from doorstate.simulation.run import is_simulated, read_settings
+from doorstate.types import Points
+
+REJECTED = "rejected.csv"
+_SAMPLES_PER_PIECE = 24
+
+
+class PreparationSummary(NamedTuple):
+    """What a preparation made."""
+
+    dataset: PreparedDataset
+    rejected: list[dict[str, str]]  # sample_id, file, reason
+
+
+class _Piece(NamedTuple):
+    rows: list[dict[str, str]]
+    source: Path
+    count: int
+    simulated: bool
+    options: ReadOptions
+
+
+def prepare_dataset(
+    source: Path,
+    folder: Path,
+    count: int = NUM_POINTS,
+    poses_csv: Path | None = None,
+    options: ReadOptions | None = None,
+    workers: int | None = None,
+    progress: Progress = no_progress,
+) -> PreparationSummary:
+    """Prepare a simulated folder or class folders of clouds into `folder`.
+
+    A cloud with fewer than `count` measured points, or that cannot be read, is left out and listed in `rejected.csv`
+    with the reason: every cloud of a prepared data set has exactly `count` distinct points.
+
+    Raises:
+        ConfigError: `folder` holds something prepared from another source or with other settings.
+        DatasetError: nothing to prepare, or nothing could be prepared.
+    """
+    options = options or ReadOptions()
+    simulated = is_simulated(source)
+    rows = _simulated_rows(source) if simulated else labelled_rows(source, poses_csv)
+    _claim(folder, {"source": str(source.resolve()), "count": count, "options": repr(options), "rows": _digest(rows)})
+    if (folder / DESCRIPTION).exists():
+        progress(1, 1)
+        rejected = read_csv(folder / REJECTED) if (folder / REJECTED).exists() else []
+        return PreparationSummary(open_dataset(folder), rejected)
+
+    pieces = [
+        _Piece(rows[start : start + _SAMPLES_PER_PIECE], source, count, simulated, options)
+        for start in range(0, len(rows), _SAMPLES_PER_PIECE)
+    ]
+    scratch = folder / "pieces"
+    paths = piece_paths(scratch, len(pieces), ".npz")
+    run_pieces(_prepare_piece, pieces, paths, workers or default_workers(), progress)
+    rejected = _assemble(folder, rows, paths, count, simulated)
+    name = read_settings(source).preset.name if simulated else source.resolve().name
+    DatasetDescription(
+        kind="simulated" if simulated else "imported",
+        source=name,
+        num_points=count,
+        samples=len(rows) - len(rejected),
+        doorstate_version=__version__,
+    ).save(folder)
+    shutil.rmtree(scratch)
+    return PreparationSummary(open_dataset(folder), rejected)
+
+
+def _simulated_rows(source: Path) -> list[dict[str, str]]:
+    if not (source / SIMULATED_MANIFEST).exists():
+        raise DatasetError(f"{source}: the simulation is not complete; run 'doorstate simulate' again to finish it")
+    return [
+        row
+        | {
+            "distance_band": distance_band(float(row["distance_m"])),
+            "region": region(float(row["robot_angle_deg"])),
+        }
+        for row in read_csv(source / SIMULATED_MANIFEST)
+    ]
+
+
+def _digest(rows: Sequence[dict[str, str]]) -> str:
+    return hashlib.sha256(json.dumps(rows).encode()).hexdigest()
+
+
+def _claim(folder: Path, settings: dict[str, object]) -> None:
+    path = folder / "preparation.json"
+    text = json.dumps(settings, indent=2) + "\n"
+    if path.is_file():
+        if path.read_text(encoding="utf-8") != text:
+            raise ConfigError(f"{folder}: holds a preparation of something else; choose another folder")
+        return
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise ConfigError(f"{folder}: exists and holds something else; choose another folder")
+    write_text(path, text)
+
+
+def _prepare_piece(piece: _Piece, path: Path) -> None:
+    clouds: list[Points] = []
+    parts: list[np.ndarray] = []
+    reasons: list[str] = []
+    for row in piece.rows:
+        try:
+            if piece.simulated:
+                cloud, part = _from_simulation(row, piece.count)
+                parts.append(part)
+            else:
+                cloud = _exactly(read_cloud(piece.source / row["file"], piece.options), piece.count)[0]
+            clouds.append(cloud)
+            reasons.append("")
+        except (CloudError, CameraError) as error:
+            reasons.append(str(error))
+    with atomic_path(path) as temporary:
+        np.savez(
+            temporary,
+            clouds=np.array(clouds, dtype=np.float32).reshape(-1, piece.count, 3),
+            parts=np.array(parts, dtype=np.uint8).reshape(-1, piece.count),
+            reasons=np.array(reasons, dtype=str),
+        )
+
+
+def _from_simulation(row: dict[str, str], count: int) -> tuple[Points, np.ndarray]:
+    frame = replay(unflatten(row))
+    if hashlib.sha256(frame.cut.depth_m.tobytes()).hexdigest() != row["depth_sha256"]:
+        raise DatasetError(f"{row['sample_id']}: renders differently than its manifest says; simulate it again here")
+    cloud, indices = _exactly(frame.points, count)
+    return cloud, frame.cut.part.reshape(-1)[indices]
+
+
+def _exactly(points: Points, count: int) -> tuple[Points, np.ndarray]:
+    prepared = prepare_cloud(points, count)
+    if len(prepared.points) < count:
+        raise CloudContentError(f"too few points: {len(prepared.points)} measured, {count} asked for (--points)")
+    return prepared
+
+
+def _assemble(
+    folder: Path, rows: list[dict[str, str]], paths: list[Path], count: int, simulated: bool
+) -> list[dict[str, str]]:
+    reasons: list[str] = []
+    for path in paths:
+        with np.load(path, allow_pickle=False) as piece:
+            reasons += [str(reason) for reason in piece["reasons"]]
+    kept = [row for row, reason in zip(rows, reasons, strict=True) if not reason]
+    rejected = [
+        {"sample_id": row["sample_id"], "file": row.get("file", ""), "reason": reason}
+        for row, reason in zip(rows, reasons, strict=True)
+        if reason
+    ]
+    if rejected:
+        write_csv(folder / REJECTED, rejected)
+    if not kept:
+        raise DatasetError(f"none of the {len(rows)} clouds could be prepared; the first: {rejected[0]['reason']}")
+    _concatenate(folder / CLOUDS, paths, "clouds", (len(kept), count, 3), np.float32)
+    if simulated:
+        _concatenate(folder / PARTS, paths, "parts", (len(kept), count), np.uint8)
+    write_csv(folder / MANIFEST, kept)
+    return rejected
+
+
+def _concatenate(target: Path, paths: list[Path], name: str, shape: tuple[int, ...], dtype: type) -> None:
+    with atomic_path(target) as temporary:
+        whole = np.lib.format.open_memmap(temporary, mode="w+", dtype=dtype, shape=shape)
+        start = 0
+        for path in paths:
+            with np.load(path, allow_pickle=False) as piece:
+                part = piece[name]
+            whole[start : start + len(part)] = part
+            start += len(part)
+        whole.flush()
+        del whole

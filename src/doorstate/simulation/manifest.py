@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Manifest rows as CSV: one flat line a sample, nested settings as `door.hinge`, floats that read back exactly."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from doorstate.errors import DatasetError
+from doorstate.files import write_text
+from doorstate.simulation.generate import SampleRow
+
+
+def flatten(row: SampleRow) -> dict[str, str]:
+    """Columns and their text, in the order of the model's fields."""
+    columns: dict[str, str] = {}
+    for name, value in row.model_dump().items():
+        if isinstance(value, dict):
+            columns |= {f"{name}.{key}": str(inner) for key, inner in value.items()}
+        else:
+            columns[name] = str(value)
+    return columns
+
+
+def unflatten(columns: Mapping[str, str]) -> SampleRow:
+    """The row behind a line of a manifest; columns the model does not know are left out.
+
+    Raises:
+        DatasetError: a column is missing or holds what it cannot hold.
+    """
+    nested: dict[str, Any] = {}
+    for name, value in columns.items():
+        outer, _, inner = name.partition(".")
+        if outer not in SampleRow.model_fields:
+            continue
+        if inner:
+            nested.setdefault(outer, {})[inner] = value
+        else:
+            nested[outer] = value
+    try:
+        return SampleRow.model_validate(nested)
+    except ValidationError as error:
+        problem = error.errors()[0]
+        column = ".".join(str(step) for step in problem["loc"])
+        raise DatasetError(f"manifest line {columns.get('sample_id', '?')}, column {column}: {problem['msg']}") from error
+
+
+def write_csv(path: Path, rows: Sequence[Mapping[str, str]]) -> None:
+    """Write rows under the union of their columns, in order of appearance."""
+    names = list(dict.fromkeys(name for row in rows for name in row))
+    text = io.StringIO(newline="")
+    writer = csv.DictWriter(text, names, restval="", lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    write_text(path, text.getvalue())
+
+
+def read_csv(path: Path) -> list[dict[str, str]]:
+    """Read a CSV with a header line.
+
+    Raises:
+        DatasetError: the file is missing, is not text, or a line has another number of columns than the header.
+    """
+    try:
+        with path.open(encoding="utf-8", newline="") as stream:
+            reader = csv.DictReader(stream, strict=True)
+            rows = list(reader)
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise DatasetError(f"{path}: cannot be read as CSV ({error})") from error
+    for number, row in enumerate(rows, start=2):
+        if None in row or None in row.values():
+            raise DatasetError(f"{path}: line {number} has another number of columns than the header")
+    return rows

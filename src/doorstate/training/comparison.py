@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One comparison: every network on every fold of one split, all runs of one experiment file."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from doorstate.clouds.preparation import NUM_POINTS
+from doorstate.dataset.splits import NUM_FOLDS, PROTOCOLS, draw_splits, read_splits, write_splits
+from doorstate.dataset.store import PreparedDataset, open_dataset
+from doorstate.errors import ConfigError, RunError
+from doorstate.jobs import Progress, default_workers, no_progress, run_pieces
+from doorstate.networks import create_network, list_networks
+from doorstate.training.fit import RunConfig, fit, threads
+from doorstate.training.recipes import Recipe, find_recipe
+from doorstate.training.run_folder import RunFolder, read_json, write_json
+
+
+class Experiment(BaseModel):
+    """One flat experiment file; the same keys are options of `doorstate compare`."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    name: str
+    dataset: str
+    protocol: str = "paper"
+    networks: tuple[str, ...] = Field(default_factory=lambda: tuple(list_networks()))
+    folds: int = Field(default=NUM_FOLDS, ge=1, le=NUM_FOLDS)  # how many of the five are run
+    num_points: int = Field(default=NUM_POINTS, ge=128)
+    seed: int = 0
+    recipe: str = "common"
+    recipe_changes: dict[str, Any] = {}  # fields of the recipe that differ
+
+    def recipe_of(self, network: str) -> Recipe:
+        """The recipe of a network, changes applied.
+
+        Raises:
+            ConfigError: no such recipe, or a change that it does not know.
+        """
+        recipe = find_recipe(self.recipe, network)
+        try:
+            return Recipe.model_validate(recipe.model_dump() | self.recipe_changes)
+        except ValidationError as error:
+            raise ConfigError(f"experiment {self.name}: recipe_changes: {_first(error)}") from error
+
+    def check(self) -> None:
+        """Raise ConfigError for a name that does not exist, before anything is trained."""
+        if self.protocol not in PROTOCOLS:
+            raise ConfigError(f"no protocol {self.protocol!r}: choose one of {', '.join(PROTOCOLS)}")
+        for network in self.networks:
+            create_network(network)
+            self.recipe_of(network)
+
+
+class Run(NamedTuple):
+    """One network on one fold, and where it lies."""
+
+    network: str
+    fold: int
+    folder: RunFolder
+
+
+class _Piece(NamedTuple):
+    experiment: Experiment
+    folder: Path
+    network: str
+    fold: int
+    threads: int | None
+
+
+def load_experiment(path: Path | None, overrides: Mapping[str, Any]) -> Experiment:
+    """An experiment from a TOML file and overrides; overrides win, then the file, then the defaults.
+
+    Raises:
+        ConfigError: the file is missing, is no TOML, or holds an unknown or wrong value.
+    """
+    values: dict[str, Any] = {}
+    if path is not None:
+        try:
+            values = tomllib.loads(path.read_text(encoding="utf-8"))
+        except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+            raise ConfigError(f"{path}: cannot be read as an experiment ({error})") from error
+        values.setdefault("name", path.stem)
+    changes = values.get("recipe_changes", {}) | overrides.get("recipe_changes", {})
+    try:
+        experiment = Experiment.model_validate(values | dict(overrides) | {"recipe_changes": changes})
+    except ValidationError as error:
+        raise ConfigError(f"{path or 'options'}: {_first(error)}") from error
+    experiment.check()
+    return experiment
+
+
+def runs_of(experiment: Experiment, folder: Path) -> list[Run]:
+    """All runs, fold by fold, so that a partial comparison compares all networks on the same folds."""
+    return [
+        Run(network, fold, RunFolder(folder / "runs" / network / f"fold{fold}"))
+        for fold in range(experiment.folds)
+        for network in experiment.networks
+    ]
+
+
+def compare(
+    experiment: Experiment, folder: Path, jobs: int = 1, progress: Progress = no_progress
+) -> list[dict[str, Any]]:
+    """Train and test every network on every fold; finished runs are kept, begun ones continued.
+
+    Args:
+        experiment: what to run.
+        folder: of the comparison: `comparison.json`, `splits.csv`, `runs/<network>/fold<k>/`.
+        jobs: runs at the same time; each gets an equal share of the processors.
+        progress: called with runs finished and runs in all.
+
+    Returns:
+        Metrics of every run.
+
+    Raises:
+        RunError: the folder holds another comparison.
+    """
+    prepare_comparison(experiment, folder)
+    runs = runs_of(experiment, folder)
+    share = max(1, default_workers() // jobs) if jobs > 1 else None
+    pieces = [_Piece(experiment, folder, run.network, run.fold, share) for run in runs]
+    run_pieces(_run_piece, pieces, [run.folder.metrics for run in runs], jobs, progress)
+    return [run.folder.read_metrics() for run in runs]
+
+
+def prepare_comparison(experiment: Experiment, folder: Path) -> None:
+    """Write down what is compared and draw the splits, or make sure the folder holds this very comparison."""
+    path = folder / "comparison.json"
+    settings = experiment.model_dump(mode="json") | {
+        "recipe": {"name": experiment.recipe}
+        | {network: experiment.recipe_of(network).model_dump(mode="json") for network in experiment.networks}
+    }
+    if path.is_file():
+        found = read_json(path)
+        changed = sorted(key for key in {*found, *settings} if found.get(key) != settings.get(key))
+        if changed:
+            raise RunError(f"{folder}: holds a comparison with another {', '.join(changed)}; choose another folder")
+    dataset = open_dataset(Path(experiment.dataset))
+    splits_path = folder / "splits.csv"
+    if not splits_path.is_file():
+        write_splits(splits_path, draw_splits(dataset.rows, experiment.protocol, experiment.seed))
+    write_json(path, settings)
+
+
+def train_one(
+    experiment: Experiment,
+    folder: Path,
+    dataset: PreparedDataset,
+    network: str,
+    fold: int,
+    splits_path: Path,
+) -> dict[str, Any]:
+    """Train one network of an experiment on one fold."""
+    splits = read_splits(splits_path)
+    if not 0 <= fold < len(splits):
+        raise ConfigError(f"there is no fold {fold}: folds are 0 to {len(splits) - 1}")
+    config = RunConfig(
+        network=network,
+        dataset=experiment.dataset,
+        protocol=experiment.protocol,
+        fold=fold,
+        num_points=experiment.num_points,
+        seed=experiment.seed,
+        recipe=experiment.recipe_of(network),
+    )
+    return fit(config, dataset, splits[fold], folder)
+
+
+def _run_piece(piece: _Piece, path: Path) -> None:
+    with threads(piece.threads):
+        dataset = open_dataset(Path(piece.experiment.dataset))
+        train_one(
+            piece.experiment, path.parent, dataset, piece.network, piece.fold, piece.folder / "splits.csv"
+        )
+
+
+def _first(error: ValidationError) -> str:
+    problem = error.errors()[0]
+    where: Sequence[Any] = problem["loc"]
+    return f"{'.'.join(str(step) for step in where)}: {problem['msg']}"

@@ -1,0 +1,303 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One run: one network trained on one fold, in one folder, resumable at every epoch.
+
+Everything random in an epoch comes from (seed, fold, epoch), so a run that was killed and started again ends with the
+same weights as one that was not, given the same number of threads.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import lightning_fabric
+import numpy as np
+import torch
+from pydantic import BaseModel, ConfigDict
+from sklearn.metrics import accuracy_score, f1_score
+from torch import Tensor
+from torch.nn import functional
+
+from doorstate.dataset.loader import CloudLoader
+from doorstate.dataset.splits import Role
+from doorstate.dataset.store import PreparedDataset
+from doorstate.errors import DatasetError, RunError
+from doorstate.files import atomic_path
+from doorstate.networks import create_network
+from doorstate.networks.base import PointNetwork
+from doorstate.networks.layers import set_batchnorm
+from doorstate.training.environment import bf16_is_quick, describe_environment
+from doorstate.training.recipes import Recipe, batchnorm_momentum, learning_rate, points_of_epoch
+from doorstate.training.run_folder import RunFolder
+from doorstate.training.weights import WeightsCard, load_into, save_weights
+from doorstate.types import STATES
+
+_EVALUATION_BATCH = 32
+
+
+class RunConfig(BaseModel):
+    """What a run trains; kept in its folder, and a folder is continued only with the same."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    network: str
+    network_options: dict[str, Any] = {}
+    dataset: str
+    protocol: str
+    fold: int
+    num_points: int
+    seed: int
+    recipe: Recipe
+
+
+class Evaluation(NamedTuple):
+    """Mean loss and class probabilities (M, 3) of samples in order."""
+
+    loss: float
+    probabilities: np.ndarray
+    labels: np.ndarray
+
+    @property
+    def macro_f1(self) -> float:
+        return float(
+            f1_score(self.labels, self.probabilities.argmax(1), labels=range(len(STATES)), average="macro", zero_division=0)
+        )
+
+    @property
+    def accuracy(self) -> float:
+        return float(accuracy_score(self.labels, self.probabilities.argmax(1)))
+
+
+def fit(config: RunConfig, dataset: PreparedDataset, roles: Mapping[str, Role], folder: Path) -> dict[str, Any]:
+    """Train, choose the epoch on the validation samples, read the test samples once.
+
+    Args:
+        config: what to train.
+        dataset: clouds.
+        roles: {sample_id: role} of this fold.
+        folder: of this run; finished runs are returned as they are, begun ones are continued.
+
+    Returns:
+        The run's metrics, as in its `metrics.json`.
+
+    Raises:
+        RunError: the folder belongs to another run, or the loss is no longer a number.
+        DatasetError: a role has no samples.
+    """
+    run = RunFolder(folder)
+    run.claim(config.model_dump(mode="json"), describe_environment())
+    if run.finished:
+        return run.read_metrics()
+    samples = _samples(roles)
+    fabric = lightning_fabric.Fabric(accelerator="auto", devices=1, precision=_precision(config.recipe))
+    with torch.random.fork_rng():
+        torch.manual_seed(_seed(config, 0))
+        network = _build(config)
+        trainer = _Trainer(config, fabric, network, dataset, samples, run)
+        trainer.train()
+        metrics = trainer.test()
+    run.finish(metrics)
+    return metrics
+
+
+@torch.no_grad()
+def evaluate(network: PointNetwork, loader: CloudLoader, fabric: lightning_fabric.Fabric) -> Evaluation:
+    """Run a network over all samples of a loader."""
+    network.eval()
+    logits, labels = [], []
+    for batch in loader.in_order(_EVALUATION_BATCH):
+        with fabric.autocast():
+            logits.append(network(fabric.to_device(batch.points)).float().cpu())
+        labels.append(batch.labels)
+    all_logits, all_labels = torch.cat(logits), torch.cat(labels)
+    loss = functional.cross_entropy(all_logits, all_labels).item()
+    return Evaluation(loss, all_logits.softmax(1).numpy(), all_labels.numpy())
+
+
+class _Trainer:
+    def __init__(
+        self,
+        config: RunConfig,
+        fabric: lightning_fabric.Fabric,
+        network: PointNetwork,
+        dataset: PreparedDataset,
+        samples: dict[str, list[str]],
+        run: RunFolder,
+    ) -> None:
+        self.config, self.fabric, self.run = config, fabric, run
+        self.dataset, self.samples = dataset, samples
+        self.network = network.to(fabric.device)
+        self.optimizer = _optimizer(config.recipe, network)
+        self.log: list[dict[str, float]] = []
+        self.best: tuple[float, float] = (-1.0, -math.inf)
+        self.best_epoch = -1
+        self._resume()
+
+    def train(self) -> None:
+        recipe, points = self.config.recipe, 0
+        loader = validation = None
+        for epoch in range(len(self.log), recipe.epochs):
+            started = time.perf_counter()
+            wanted = points_of_epoch(recipe, epoch, self.config.num_points)
+            if loader is None or validation is None or wanted != points:
+                points = wanted
+                loader = CloudLoader(self.dataset, self.samples["train"], points)
+                validation = CloudLoader(self.dataset, self.samples["val"], points)
+            rate, loss = self._epoch(epoch, loader)
+            found = evaluate(self.network, validation, self.fabric)
+            # The final resolution is what counts: an epoch on coarser clouds is never the best of a run.
+            full = points == points_of_epoch(recipe, recipe.epochs - 1, self.config.num_points)
+            score = (found.macro_f1, -found.loss)
+            if full and score > self.best:
+                self.best, self.best_epoch = score, epoch
+                save_weights(self.run.weights, self.network, self._card())
+            self.log.append(
+                {
+                    "epoch": epoch,
+                    "points": points,
+                    "lr": rate,
+                    "train_loss": loss,
+                    "val_loss": found.loss,
+                    "val_macro_f1": found.macro_f1,
+                    "seconds": time.perf_counter() - started,
+                }
+            )
+            self._checkpoint()
+
+    def test(self) -> dict[str, Any]:
+        load_into(self.network, self.run.weights)
+        self.network.to(self.fabric.device)
+        tested = self.samples["test"]
+        found = evaluate(
+            self.network, CloudLoader(self.dataset, tested, self.config.num_points), self.fabric
+        )
+        self.run.write_predictions(tested, found.labels, found.probabilities)
+        return {
+            "network": self.config.network,
+            "fold": self.config.fold,
+            "best_epoch": self.best_epoch,
+            "val_macro_f1": self.best[0],
+            "test_macro_f1": found.macro_f1,
+            "test_accuracy": found.accuracy,
+            "seconds": sum(line["seconds"] for line in self.log),
+            "train_samples": len(self.samples["train"]),
+            "val_samples": len(self.samples["val"]),
+            "test_samples": len(tested),
+        }
+
+    def _epoch(self, epoch: int, loader: CloudLoader) -> tuple[float, float]:
+        config, recipe = self.config, self.config.recipe
+        torch.manual_seed(_seed(config, epoch + 1))  # dropout
+        per_epoch = max(1, len(loader) // recipe.batch_size)
+        losses: list[float] = []
+        self.network.train()
+        rate = 0.0
+        batches = loader.shuffled(recipe.batch_size, recipe.augmentation, (config.seed, config.fold, epoch))
+        for iteration, batch in enumerate(batches, start=epoch * per_epoch):
+            rate = learning_rate(recipe, iteration, per_epoch)
+            for group in self.optimizer.param_groups:
+                group["lr"] = rate
+            momentum = batchnorm_momentum(recipe, iteration, per_epoch)
+            if momentum is not None:
+                set_batchnorm(self.network, momentum=momentum)
+            losses.append(self._step(self.fabric.to_device(batch.points), self.fabric.to_device(batch.labels)))
+        mean = float(np.mean(losses))
+        if not math.isfinite(mean):
+            raise RunError(f"{self.run.path}: the loss is {mean} in epoch {epoch}; try a lower learning rate")
+        return rate, mean
+
+    def _step(self, points: Tensor, labels: Tensor) -> float:
+        self.optimizer.zero_grad(set_to_none=True)
+        with self.fabric.autocast():
+            loss, _ = self.network.training_loss(points, labels, self.config.recipe.label_smoothing)
+        loss.backward()  # type: ignore[no-untyped-call]
+        if self.config.recipe.gradient_clip is not None:
+            torch.nn.utils.clip_grad_norm_(self.network.parameters(), self.config.recipe.gradient_clip)
+        self.optimizer.step()
+        return float(loss.detach())
+
+    def _checkpoint(self) -> None:
+        state = {
+            "network": self.network.state_dict(),
+            "optimizer": self.optimizer.state_dict(),
+            "log": self.log,
+            "best": list(self.best),
+            "best_epoch": self.best_epoch,
+        }
+        with atomic_path(self.run.checkpoint) as temporary:
+            torch.save(state, temporary)
+        self.run.write_log(self.log)
+
+    def _resume(self) -> None:
+        if not self.run.checkpoint.is_file():
+            return
+        try:
+            state = torch.load(self.run.checkpoint, map_location=self.fabric.device, weights_only=True)
+        except Exception as error:  # torch raises many kinds for a damaged file
+            raise RunError(f"{self.run.checkpoint}: cannot be read ({error}); delete the run's folder") from error
+        self.network.load_state_dict(state["network"])
+        self.optimizer.load_state_dict(state["optimizer"])
+        self.log, self.best_epoch = state["log"], state["best_epoch"]
+        self.best = (state["best"][0], state["best"][1])
+
+    def _card(self) -> WeightsCard:
+        config = self.config
+        return WeightsCard(
+            network=config.network,
+            network_options=_network_options(config),
+            num_points=config.num_points,
+            trained_on=f"{self.dataset.description.source}, protocol {config.protocol}, fold {config.fold}",
+        )
+
+
+def _build(config: RunConfig) -> PointNetwork:
+    return create_network(config.network, len(STATES), **_network_options(config))
+
+
+def _network_options(config: RunConfig) -> dict[str, Any]:
+    eps = config.recipe.batchnorm_eps
+    return config.network_options | ({} if eps is None else {"batchnorm_eps": eps})
+
+
+def _optimizer(recipe: Recipe, network: PointNetwork) -> torch.optim.Optimizer:
+    parameters = network.parameters()
+    if recipe.optimizer == "sgd":
+        return torch.optim.SGD(
+            parameters, recipe.learning_rate, momentum=recipe.momentum, weight_decay=recipe.weight_decay
+        )
+    kind = torch.optim.AdamW if recipe.optimizer == "adamw" else torch.optim.Adam
+    return kind(parameters, recipe.learning_rate, eps=recipe.adam_eps, weight_decay=recipe.weight_decay)
+
+
+def _precision(recipe: Recipe) -> Any:
+    bf16 = recipe.precision == "bf16" or (recipe.precision == "auto" and bf16_is_quick())
+    return "bf16-mixed" if bf16 else "32-true"
+
+
+def _seed(config: RunConfig, epoch: int) -> int:
+    return int(np.random.SeedSequence([config.seed, config.fold, epoch]).generate_state(1)[0])
+
+
+def _samples(roles: Mapping[str, Role]) -> dict[str, list[str]]:
+    samples: dict[str, list[str]] = {"train": [], "val": [], "test": [], "unused": []}
+    for sample, role in roles.items():
+        samples[role].append(sample)
+    for role in ("train", "val", "test"):
+        if len(samples[role]) < 2:
+            raise DatasetError(f"only {len(samples[role])} samples for {role}: the data set is too small for this split")
+    return samples
+
+
+@contextmanager
+def threads(count: int | None) -> Iterator[None]:
+    """Let torch use `count` threads for a while; None leaves it as it is."""
+    before = torch.get_num_threads()
+    torch.set_num_threads(count or before)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)

@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The files of one run: config, environment, log, checkpoint, weights, predictions, and metrics last of all."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from doorstate.errors import RunError
+from doorstate.files import write_text
+from doorstate.simulation.manifest import write_csv
+from doorstate.types import STATES
+
+
+class RunFolder:
+    """One run on disk; it is finished once `metrics.json` is there."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.config = path / "config.json"
+        self.environment = path / "environment.json"
+        self.log = path / "log.csv"
+        self.checkpoint = path / "checkpoint.pt"
+        self.weights = path / "weights.safetensors"
+        self.predictions = path / "predictions.csv"
+        self.metrics = path / "metrics.json"
+
+    @property
+    def finished(self) -> bool:
+        return self.metrics.is_file()
+
+    def claim(self, config: Mapping[str, Any], environment: Mapping[str, Any]) -> None:
+        """Begin the run, or make sure that the folder holds this very run.
+
+        Raises:
+            RunError: the folder holds another run.
+        """
+        if self.config.is_file():
+            found = read_json(self.config)
+            if found != config:
+                changed = sorted(key for key in {*found, *config} if found.get(key) != config.get(key))
+                raise RunError(f"{self.path}: holds a run with another {', '.join(changed)}; choose another folder")
+        else:
+            write_json(self.config, config)
+        if not self.finished:
+            write_json(self.environment, environment)
+
+    def read_metrics(self) -> dict[str, Any]:
+        """Metrics of a finished run."""
+        return read_json(self.metrics)
+
+    def write_log(self, lines: Sequence[Mapping[str, float]]) -> None:
+        """Write one line per epoch."""
+        write_csv(self.log, [{key: f"{value:.6g}" for key, value in line.items()} for line in lines])
+
+    def write_predictions(self, samples: Sequence[str], labels: np.ndarray, probabilities: np.ndarray) -> None:
+        """Write the test samples' states and probabilities (M, 3)."""
+        write_csv(
+            self.predictions,
+            [
+                {
+                    "sample_id": sample,
+                    "state": STATES[label],
+                    "predicted": STATES[int(row.argmax())],
+                    **{f"p_{state}": f"{p:.6f}" for state, p in zip(STATES, row, strict=True)},
+                }
+                for sample, label, row in zip(samples, labels, probabilities, strict=True)
+            ],
+        )
+
+    def finish(self, metrics: Mapping[str, Any]) -> None:
+        """Write the metrics, and drop the checkpoint that nobody needs any more."""
+        write_json(self.metrics, metrics)
+        self.checkpoint.unlink(missing_ok=True)
+
+
+def read_json(path: Path) -> dict[str, Any]:
+    """Read a JSON object.
+
+    Raises:
+        RunError: the file is missing or damaged.
+    """
+    try:
+        value = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise RunError(f"{path}: cannot be read ({error})") from error
+    if not isinstance(value, dict):
+        raise RunError(f"{path}: holds no JSON object")
+    return value
+
+
+def write_json(path: Path, value: Mapping[str, Any]) -> None:
+    """Write a JSON object, indented."""
+    write_text(path, json.dumps(value, indent=2) + "\n")
