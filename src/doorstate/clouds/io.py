@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Any file a robot builder has, read into the one frame of the library: the door to the outside."""
+
+from __future__ import annotations
+
+import math
+import re
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from doorstate.clouds.arrays import parse_npy, parse_npz
+from doorstate.clouds.camera import Intrinsics
+from doorstate.clouds.depth import depth_to_points, points_from_optical, undo_roll
+from doorstate.clouds.pcd import parse_pcd
+from doorstate.clouds.ply import parse_ply
+from doorstate.clouds.png import parse_depth_png
+from doorstate.clouds.tables import parse_table
+from doorstate.errors import CameraError, CloudReadError, DoorstateError
+from doorstate.types import Points
+
+_PARSERS: dict[str, Callable[[bytes], NDArray[Any]]] = {
+    ".pcd": parse_pcd,
+    ".ply": parse_ply,
+    ".npy": parse_npy,
+    ".npz": parse_npz,
+    ".xyz": parse_table,
+    ".txt": parse_table,
+    ".csv": parse_table,
+    ".png": parse_depth_png,
+}
+CLOUD_SUFFIXES: tuple[str, ...] = tuple(_PARSERS)
+
+# A point of a file has at most this many values; an array of wider rows is a depth image.
+_MAX_POINT_VALUES = 16
+# The largest 16-bit value is how some recorders write "no return"; others write 0.
+_NO_RETURN = 65535
+
+
+@dataclass(frozen=True)
+class ReadOptions:
+    """What a file does not say about itself.
+
+    Args:
+        frame: frame of cloud files, `body` (x forward, y left, z up) or `optical` (x right, y down, z
+            forward); depth images are always optical.
+        roll_deg: how far the camera was turned clockwise, seen from behind: 0, 90, 180 or 270.
+        intrinsics: camera of depth images.
+        depth_scale_m: metres per stored unit of integer depth images.
+        units_m: metres per unit of cloud files and of floating point depth images (metres by ROS REP 118).
+
+    Raises:
+        CameraError: when a scale is not positive, or the frame is neither of the two.
+    """
+
+    frame: Literal["body", "optical"] = "body"
+    roll_deg: int = 0
+    intrinsics: Intrinsics | None = None
+    depth_scale_m: float = 0.001
+    units_m: float = 1.0
+
+    def __post_init__(self) -> None:
+        if self.frame not in ("body", "optical"):
+            raise CameraError(f"frame {self.frame!r} is neither 'body' nor 'optical'")
+        for scale_m in (self.depth_scale_m, self.units_m):
+            if not (math.isfinite(scale_m) and scale_m > 0):
+                raise CameraError(f"a scale of {scale_m} metres per unit is impossible: it must be positive")
+
+
+DEFAULT_OPTIONS = ReadOptions()
+
+
+def read_cloud(path: Path, options: ReadOptions = DEFAULT_OPTIONS) -> Points:
+    """Read one file, chosen by its suffix, as points in the body frame.
+
+    Args:
+        path: a cloud (.pcd .ply .npy .npz .xyz .txt .csv) or a depth image (16-bit .png, 2-D .npy, .npz).
+        options: what the file does not say about itself.
+
+    Returns:
+        (N, 3) float32 metres, in file order (images and organized clouds row by row), NaN rows kept.
+
+    Raises:
+        CloudReadError: when the file cannot be read as what its suffix says.
+        CameraError: when a depth image lacks intrinsics or they are for another image size.
+    """
+    suffix = path.suffix.lower()
+    try:
+        if path.is_dir():
+            raise CloudReadError("is a folder, not a file")
+        if suffix not in _PARSERS:
+            raise CloudReadError(f"unknown file type: give one of {' '.join(CLOUD_SUFFIXES)}")
+        data = _read_bytes(path)
+        # What a library warns of in foreign bytes either ends in an error below or is of no concern.
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            stored = _PARSERS[suffix](data)
+            is_depth = suffix == ".png" or (stored.ndim == 2 and stored.shape[1] > _MAX_POINT_VALUES)
+            return _points_from_depth(stored, options) if is_depth else _points_from_rows(stored, options)
+    except DoorstateError as error:
+        raise type(error)(f"{path.name}: {error}") from error
+    except Exception as error:
+        # Foreign bytes make parsing libraries raise anything; to the user it is one thing.
+        reason = " ".join(f"{type(error).__name__}: {error}".split())[:160]
+        raise CloudReadError(f"{path.name}: damaged, or no {suffix} file ({reason})") from error
+
+
+def find_clouds(paths: Sequence[Path]) -> list[Path]:
+    """List the files to read: files as given, folders searched through.
+
+    In folders, hidden files and colour images beside depth images (`*_rgb.png`) are passed over.
+
+    Returns:
+        Paths in the order given, those of one folder sorted as people count (2 before 10).
+
+    Raises:
+        CloudReadError: when a path does not exist, or a folder holds no cloud.
+    """
+    found: list[Path] = []
+    for path in paths:
+        if path.is_dir():
+            members = [member for member in path.rglob("*") if member.is_file()]
+            clouds = [member for member in members if _is_cloud(member.relative_to(path))]
+            if not clouds:
+                raise CloudReadError(f"{path}: no clouds in this folder ({' '.join(CLOUD_SUFFIXES)})")
+            found += sorted(clouds, key=_natural_order)
+        elif path.exists():
+            found.append(path)
+        else:
+            raise CloudReadError(f"{path}: no such file or folder")
+    return found
+
+
+def _is_cloud(path: Path) -> bool:
+    hidden = any(part.startswith(".") for part in path.parts)
+    return path.suffix.lower() in _PARSERS and not hidden and not path.name.lower().endswith("_rgb.png")
+
+
+def _natural_order(path: Path) -> tuple[list[str | int], str]:
+    pieces = re.split(r"(\d+)", str(path).lower())
+    return [int(piece) if place % 2 else piece for place, piece in enumerate(pieces)], str(path)
+
+
+def _read_bytes(path: Path) -> bytes:
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise CloudReadError(f"cannot be read: {error.strerror or error}") from error
+    if not data:
+        raise CloudReadError("is empty (0 bytes)")
+    return data
+
+
+def _points_from_depth(stored: NDArray[Any], options: ReadOptions) -> Points:
+    if options.intrinsics is None:
+        height, width = stored.shape
+        raise CameraError(
+            f"a depth image ({width} x {height} pixels) needs the camera's intrinsics: "
+            "give --intrinsics FILE or --fx --fy --cx --cy"
+        )
+    scale_m = options.units_m if stored.dtype.kind == "f" else options.depth_scale_m
+    depth_m = stored.astype(np.float64) * scale_m
+    if stored.dtype.newbyteorder("=") == np.uint16:
+        depth_m[stored == _NO_RETURN] = np.nan
+    return depth_to_points(depth_m, options.intrinsics, options.roll_deg).reshape(-1, 3)  # (H * W, 3)
+
+
+def _points_from_rows(stored: NDArray[Any], options: ReadOptions) -> Points:
+    if stored.ndim not in (2, 3) or not 3 <= stored.shape[-1] <= _MAX_POINT_VALUES:
+        raise CloudReadError(f"holds shape {stored.shape}: expected (N, 3), (H, W, 3) or depth (H, W)")
+    rows = stored[..., :3].reshape(-1, 3).astype(np.float64)  # (N, 3)
+    points = (rows * options.units_m).astype(np.float32)
+    if options.frame == "optical":
+        points = points_from_optical(points)
+    return undo_roll(points, options.roll_deg)

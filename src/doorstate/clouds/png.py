@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Depth images stored as 16-bit grey PNG."""
+
+from __future__ import annotations
+
+import io
+import struct
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from doorstate.errors import CloudReadError
+
+# PNG specification, IHDR: the first chunk holds width, height, bit depth and colour type (0 is grey).
+_HEADER = struct.Struct(">8s4x4sIIBB")
+_SIGNATURE = b"\x89PNG\r\n\x1a\n"
+# zlib's technical notes: deflate packs at most 1032 bytes into one.
+_MAX_EXPANSION = 1032
+
+
+def parse_depth_png(data: bytes) -> NDArray[np.uint16]:
+    """Read the pixels of a 16-bit grey PNG.
+
+    Returns:
+        (H, W) as stored.
+
+    Raises:
+        CloudReadError: when it is no PNG, a colour or 8-bit image, or damaged.
+    """
+    if len(data) < _HEADER.size:
+        raise CloudReadError("is no PNG image")
+    signature, chunk, width, height, bits, colour_type = _HEADER.unpack_from(data)
+    if signature != _SIGNATURE or chunk != b"IHDR":
+        raise CloudReadError("is no PNG image")
+    if colour_type != 0:
+        raise CloudReadError("is a colour image, not a depth image: give the 16-bit depth image beside it")
+    if bits != 16:
+        raise CloudReadError(f"{bits}-bit image, {2**bits} depth steps: not a depth image in 16 bit")
+    if 2 * width * height > _MAX_EXPANSION * len(data):
+        raise CloudReadError(
+            f"is truncated: {width} x {height} pixels are declared, {len(data)} bytes are there"
+        )
+    with Image.open(io.BytesIO(data), formats=["PNG"]) as image:
+        return np.asarray(image).astype(np.uint16)
