@@ -9,6 +9,7 @@ from typing import Any
 from doorstate.errors import ConfigError
 from doorstate.networks.base import PointNetwork
 from doorstate.networks.dgcnn import DGCNN
+from doorstate.networks.point2sequence import Point2Sequence
 from doorstate.networks.pointcnn import PointCNN
 from doorstate.networks.pointnet import PointNet
 from doorstate.networks.pointnet2 import PointNet2
@@ -18,6 +19,7 @@ NETWORKS: dict[str, type[PointNetwork]] = {
     "pointnet2": PointNet2,
     "dgcnn": DGCNN,
     "pointcnn": PointCNN,
+    "point2sequence": Point2Sequence,
 }
 
 

@@ -17,6 +17,9 @@ class RowBatchNorm(nn.BatchNorm1d):
     """Batch normalisation of channels over all rows of all clouds."""
 
     momentum: float
+    running_mean: Tensor
+    running_var: Tensor
+    num_batches_tracked: Tensor
 
     def forward(self, rows: Tensor) -> Tensor:
         return super().forward(rows.reshape(-1, self.num_features)).view(rows.shape)
@@ -30,8 +33,6 @@ class RowBatchNorm(nn.BatchNorm1d):
             variance: (C,) of the batch, divided by count.
             count: number of rows the statistics are of.
         """
-        assert self.running_mean is not None and self.running_var is not None  # noqa: PT018
-        assert self.num_batches_tracked is not None
         with torch.no_grad():
             self.num_batches_tracked += 1
             self.running_mean.lerp_(mean, self.momentum)

@@ -6,6 +6,7 @@ Coordinates stay in full precision even under autocast; no gradient flows throug
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from contextlib import AbstractContextManager, nullcontext
 from typing import Literal
 
@@ -13,7 +14,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-_QUERIES_PER_BLOCK = 512  # 8 MiB of distances per cloud of 4096 points: stays in cache
+_DISTANCES_PER_BLOCK = 2**19  # per cloud: 2 MiB of float32 stay in a core's cache
 
 
 def full_precision(tensor: Tensor) -> AbstractContextManager[object]:
@@ -73,8 +74,7 @@ def knn(query: Tensor, points: Tensor, k: int) -> Tensor:
     """Nearest neighbours, nearest first.
 
     A query equal to the point of the same index is that point: it comes first, whatever duplicates it has
-    (all networks query a prefix of the points). Three coordinates are compared by exact differences, longer
-    feature vectors, centred first, by a matrix product.
+    (all networks query a prefix of the points).
 
     Args:
         query: (B, M, D), M <= N.
@@ -84,28 +84,16 @@ def knn(query: Tensor, points: Tensor, k: int) -> Tensor:
     Returns:
         (B, M, min(k, N)) int64 indices into points.
     """
-    query, points = at_least_float32(query.detach()), at_least_float32(points.detach())
-    centroid = points.mean(dim=1, keepdim=True)
-    query, points = query - centroid, points - centroid
     k = min(k, points.shape[1])
-    blocks, start = [], 0
+    found = []
     with full_precision(points):
-        for block in torch.split(query, _QUERIES_PER_BLOCK, dim=1):
-            distances = _comparable_distances(block, points)  # (B, m, N)
-            own = (block == points[:, start : start + block.shape[1]]).all(-1)  # (B, m)
-            distances.diagonal(start, dim1=1, dim2=2).masked_fill_(own, -torch.inf)
-            blocks.append(distances.topk(k, largest=False).indices)
-            start += block.shape[1]
-    return torch.cat(blocks, dim=1)
-
-
-def _comparable_distances(query: Tensor, points: Tensor) -> Tensor:
-    """(B, M, N) numbers that order the points by distance to each query."""
-    if points.shape[-1] <= 3:
-        return torch.cdist(query, points, compute_mode="donot_use_mm_for_euclid_dist")
-    squared_norms = points.square().sum(-1).unsqueeze(1)  # (B, 1, N)
-    # |q - p|^2 without |q|^2, which does not change the order of the points.
-    return torch.baddbmm(squared_norms, query, points.mT, alpha=-2)
+        for start, block, distances in _distance_blocks(query, points):
+            same_index = torch.arange(start, start + block.shape[1], device=points.device)  # (m,)
+            same = (block == points[:, start : start + block.shape[1]]).all(-1, keepdim=True)  # (B, m, 1)
+            column = same_index.view(1, -1, 1).expand_as(same)
+            own = torch.where(same, -torch.inf, distances.gather(2, column))
+            found.append(distances.scatter_(2, column, own).topk(k, largest=False).indices)
+    return torch.cat(found, dim=1)
 
 
 def ball_query(centres: Tensor, points: Tensor, radius: float, num_samples: int) -> Tensor:
@@ -120,15 +108,46 @@ def ball_query(centres: Tensor, points: Tensor, radius: float, num_samples: int)
     Returns:
         (B, M, num_samples) int64 indices into points.
     """
-    centres, points = centres.detach(), points.detach()
     num_points = points.shape[1]
-    with full_precision(points):
-        distances = torch.cdist(centres, points, compute_mode="donot_use_mm_for_euclid_dist")  # (B, M, N)
     # Indices as float32 (exact up to 2^24): topk on floats is twice as fast as on integers.
     index = torch.arange(num_points, device=points.device, dtype=torch.float32)
-    hits = torch.where(distances < radius, index, float(num_points))
-    hits = hits.topk(min(num_samples, num_points), largest=False).values.long()  # (B, M, k)
+    k = min(num_samples, num_points)
+    found = []
+    for _, _, squared in _distance_blocks(centres, points):
+        hits = torch.where(squared < radius**2, index, float(num_points))
+        found.append(hits.topk(k, largest=False).values)
+    hits = torch.cat(found, dim=1).long()  # (B, M, k), num_points where there are no more
     first = hits[..., :1]
     hits = torch.where(hits < num_points, hits, first)
-    missing = num_samples - hits.shape[-1]
-    return torch.cat([hits, first.expand(-1, -1, missing)], dim=-1) if missing else hits
+    return torch.cat([hits, first.expand(-1, -1, num_samples - k)], dim=-1)
+
+
+def _distance_blocks(query: Tensor, points: Tensor) -> Iterator[tuple[int, Tensor, Tensor]]:
+    """Runs of queries: index of the first, (B, m, D) queries, (B, m, N) squared distances to all points.
+
+    Of coordinates by exact differences; of feature vectors by a matrix product.
+    """
+    query, points = at_least_float32(query.detach()), at_least_float32(points.detach())
+    block_size = max(1, _DISTANCES_PER_BLOCK // points.shape[1])
+    distances = _coordinate_distances if points.shape[2] == 3 else _feature_distances
+    for start in range(0, query.shape[1], block_size):
+        block = query[:, start : start + block_size]
+        yield start, block, distances(block, points)
+
+
+def _coordinate_distances(query: Tensor, points: Tensor) -> Tensor:
+    """(B, M, N) squared distances, exactly zero for equal points."""
+    columns = points.mT.contiguous()  # (B, 3, N)
+    squared = (query[..., :1] - columns[:, :1]).square_()
+    for axis in (1, 2):
+        difference = query[..., axis : axis + 1] - columns[:, axis : axis + 1]
+        squared.addcmul_(difference, difference)
+    return squared
+
+
+def _feature_distances(query: Tensor, points: Tensor) -> Tensor:
+    """(B, M, N) squared distances up to a constant per query, which leaves the order of the points."""
+    origin = points.mean(dim=1, keepdim=True)  # far from the origin, squares lose the digits that matter
+    points = points - origin
+    squared_norms = points.square().sum(-1).unsqueeze(1)  # (B, 1, N)
+    return torch.baddbmm(squared_norms, query - origin, points.mT, alpha=-2)

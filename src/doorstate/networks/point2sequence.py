@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Point2Sequence: growing areas around a point, read as a sequence with attention.
+
+Liu et al., 2019, arXiv:1811.02565.
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from doorstate.errors import ConfigError
+from doorstate.networks.base import PointNetwork
+from doorstate.networks.layers import (
+    PooledMLP,
+    RowBatchNorm,
+    classification_head,
+    dense,
+    glorot,
+    set_batchnorm,
+)
+from doorstate.networks.ops import gather_rows, knn
+
+NUM_CENTRES = 384
+WIDTH = 128
+AREAS = {16: (32, 64, WIDTH), 32: (64, 64, WIDTH), 64: (64, 64, WIDTH), 128: (128, 128, WIDTH)}
+"""Layer widths by the number of points of an area."""
+
+State = tuple[Tensor, Tensor]
+
+
+class LSTMCell(nn.Module):
+    """LSTM cell as in TensorFlow: one weight for [input; hidden], one bias, 1 added to the forget gate."""
+
+    def __init__(self, in_channels: int, hidden: int) -> None:
+        super().__init__()
+        self.linear = glorot(nn.Linear(in_channels + hidden, 4 * hidden))
+
+    def forward(self, inputs: Tensor, state: State | None = None) -> State:
+        """Hidden and cell state (..., hidden) after one step.
+
+        Without a state, hidden and cell state are zero; so are input channels left out at the end.
+        """
+        rows = inputs if state is None else torch.cat([inputs, state[0]], dim=-1)
+        # Zeros meet the last columns of the weight: leave both out.
+        gates = functional.linear(rows, self.linear.weight[:, : rows.shape[-1]], self.linear.bias)
+        enter, forget, candidate, leave = gates.chunk(4, dim=-1)
+        cell = torch.sigmoid(enter) * torch.tanh(candidate)
+        if state is not None:
+            cell = cell + torch.sigmoid(forget + 1) * state[1]
+        return torch.sigmoid(leave) * torch.tanh(cell), cell
+
+
+class Attention(nn.Module):
+    """Additive attention of one query over a memory (Bahdanau et al., 2015)."""
+
+    def __init__(self, width: int) -> None:
+        super().__init__()
+        self.memory = glorot(nn.Linear(width, width, bias=False))
+        self.query = glorot(nn.Linear(width, width, bias=False))
+        self.score = glorot(nn.Linear(width, 1, bias=False))
+        self.combine = glorot(nn.Linear(2 * width, width, bias=False))
+
+    def weights(self, memory: Tensor, query: Tensor) -> Tensor:
+        """(..., T) weights, which sum to one, of a (..., T, W) memory for a (..., W) query."""
+        scores: Tensor = self.score(torch.tanh(self.memory(memory) + self.query(query).unsqueeze(-2)))
+        return torch.softmax(scores.squeeze(-1), dim=-1)
+
+    def forward(self, memory: Tensor, query: Tensor) -> Tensor:
+        """(..., W) attention vector, a linear map of the query and the weighted memory."""
+        context = (self.weights(memory, query).unsqueeze(-1) * memory).sum(dim=-2)
+        vector: Tensor = self.combine(torch.cat([query, context], dim=-1))
+        return vector
+
+
+class Point2Sequence(PointNetwork):
+    """Point2Sequence for classification.
+
+    Args:
+        num_classes: number of logits.
+        region_feature: "attention", the attention vector, as the paper describes; "released", the decoder's
+            hidden state, as in the authors' code, where attention never reaches the output.
+        dilation: every how many of the nearest points belong to an area.
+        batchnorm_eps: epsilon of every batch normalisation; 1e-3 in the original.
+
+    Raises:
+        ConfigError: Unknown region feature.
+    """
+
+    feature_size = 1024
+
+    def __init__(
+        self,
+        num_classes: int = 3,
+        *,
+        region_feature: str = "attention",
+        dilation: int = 1,
+        batchnorm_eps: float = 1e-5,
+    ) -> None:
+        super().__init__()
+        if region_feature not in ("attention", "released"):
+            raise ConfigError(
+                f"point2sequence has no region feature {region_feature!r}: use attention or released"
+            )
+        self.region_feature = region_feature
+        self.dilation = dilation
+        self.mlps = nn.ModuleList([PooledMLP(0, channels) for channels in AREAS.values()])
+        self.encoder = LSTMCell(WIDTH, WIDTH)
+        self.decoder = LSTMCell(2 * WIDTH, WIDTH)  # input: [encoder state; previous attention]
+        self.attention = Attention(WIDTH)
+        self.region = nn.Sequential(RowBatchNorm(WIDTH), nn.ReLU(), dense(WIDTH, WIDTH))
+        self.globals = PooledMLP(WIDTH, (256, 512, 1024))
+        self.head = classification_head(self.feature_size, num_classes, dropout=0.6)
+        set_batchnorm(self, eps=batchnorm_eps)
+
+    def neighbours(self, points: Tensor) -> Tensor:
+        """(B, M, 128) sorted neighbours of the centres; the areas are its first 16, 32, 64 and 128."""
+        largest = max(AREAS)
+        # Deviation: with fewer than 128 * dilation points the dilation shrinks.
+        dilation = min(self.dilation, points.shape[1] // largest)
+        return knn(points[:, :NUM_CENTRES], points, largest * dilation)[..., ::dilation]
+
+    def sequence(self, points: Tensor) -> Tensor:
+        """(B, M, 4, 128) features of the areas, smallest first."""
+        offsets = gather_rows(points, self.neighbours(points))  # (B, M, 128, 3)
+        offsets = offsets - points[:, :NUM_CENTRES].unsqueeze(2)
+        areas = [mlp(offsets[:, :, :size]) for size, mlp in zip(AREAS, self.mlps, strict=True)]
+        return torch.stack(areas, dim=2)
+
+    def encode(self, sequence: Tensor) -> tuple[Tensor, Tensor]:
+        """Encoder states (B, M, 4, 128) and the decoder's hidden state (B, M, 128) of a sequence."""
+        state: State | None = None
+        memory = []
+        for step in sequence.unbind(dim=2):
+            state = self.encoder(step, state)
+            memory.append(state[0])
+        hidden, _ = self.decoder(memory[-1])  # one step; the previous attention is zero
+        return torch.stack(memory, dim=2), hidden
+
+    def features(self, points: Tensor) -> Tensor:
+        """(B, 1024) maximum over the centres, whose coordinates enter absolutely."""
+        region, query = self.encode(self.sequence(points))
+        region = self.attention(region, query) if self.region_feature == "attention" else query
+        pooled: Tensor = self.globals(points[:, :NUM_CENTRES], self.region(region))
+        return pooled
