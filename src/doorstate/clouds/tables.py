@@ -13,7 +13,7 @@ from doorstate.clouds.declared import check_declared
 from doorstate.errors import CloudReadError
 
 _SEPARATOR = re.compile(r"\s*[,;]\s*|\s+")
-_EMPTY_CELL = re.compile(r"(?:^|(?<=[,;]))[ \t]*(?=[,;]|$)")
+_EMPTY_CELL = re.compile(r"([,;\n])[ \t]*(?=[,;\n])")
 
 
 def parse_table(data: bytes) -> NDArray[np.float64]:
@@ -44,7 +44,8 @@ def parse_table(data: bytes) -> NDArray[np.float64]:
             delimiter = next((mark for mark in ";," if mark in line.split("#")[0]), None)
             rows = lines[number:]
             if delimiter:
-                rows = [_EMPTY_CELL.sub("nan", row) for row in rows if row]
+                text = "\n".join(["", *filter(None, rows), ""])
+                rows = _EMPTY_CELL.sub(r"\1nan", text).splitlines()
             return _load(rows, columns, delimiter)
     return np.empty((0, 3))
 
