@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The one door for files: every format in one frame, every bad file one line, and real recordings."""
+"""The one door for files: every format in one frame, every bad file one line."""
 
 from __future__ import annotations
 
-import csv
 import io
 import os
 import tracemalloc
@@ -30,7 +29,6 @@ POINTS = np.array([[1.5, -2.25, 3.125], [NAN, NAN, NAN], [0.5, 0.25, -8.0], [4.0
 CAMERA = Intrinsics(20, 4, fx=16.0, fy=16.0, cx=9.5, cy=1.5)
 DEPTH_MM = np.arange(500, 580, dtype=np.uint16).reshape(4, 20)
 DEPTH_MM[1, 2:4] = 0, 65535
-REAL = Path(__file__).resolve().parents[2].parent / "shared" / "real"
 
 PLY_HEADER = b"ply\nformat binary_little_endian 1.0\nelement vertex 4\n" + b"".join(
     b"property float %s\n" % axis for axis in (b"x", b"y", b"z")
@@ -348,47 +346,3 @@ def test_numbers_in_names_count(
     for number in numbers:
         _write(folder, f"frame{number}.pcd", b"-")
     assert find_clouds([folder]) == [folder / f"frame{number}.pcd" for number in sorted(numbers)]
-
-
-@pytest.mark.skipif(not REAL.is_dir(), reason="the recorded frames are not here")
-class TestRecordedFrames:
-    """Frames of real cameras: their intrinsics and units are in index.csv."""
-
-    @staticmethod
-    def _rows() -> list[dict[str, str]]:
-        with (REAL / "index.csv").open(encoding="utf-8") as file:
-            return list(csv.DictReader(file))
-
-    def test_every_frame_is_metres_of_a_room(self) -> None:
-        known = [row for row in self._rows() if row["fx"] != "?" and "8bit" not in row["file"]]
-        assert len(known) > 20
-        for row in known:
-            numbers = [float(row[name]) for name in ("fx", "fy", "cx", "cy") if row[name]]
-            camera = Intrinsics(int(row["width"]), int(row["height"]), *numbers) if numbers else None
-            options = ReadOptions(intrinsics=camera, depth_scale_m=float(row["depth_unit_m"] or 1))
-            points = read_cloud(REAL / row["file"], options)
-            assert points.shape == ((camera.width * camera.height if camera else 112586), 3)
-            range_m = np.linalg.norm(points, axis=1)
-            assert 0.3 < np.nanmedian(range_m) < 10, row["file"]
-            assert np.isfinite(range_m).mean() > 0.5, row["file"]
-            if camera:
-                assert np.nanmin(points[:, 0]) > 0
-
-    def test_arrays_of_an_unknown_camera_take_a_given_one(self) -> None:
-        camera = Intrinsics.from_hfov(640, 360, np.deg2rad(87))  # D435 datasheet: 87 degrees of depth
-        for row in self._rows():
-            if row["fx"] == "?":
-                points = read_cloud(REAL / row["file"], ReadOptions(intrinsics=camera))
-                assert 0.3 < np.nanmedian(points[:, 0]) < 10
-                assert np.nanmax(points[:, 0]) < 65.5
-
-    def test_the_8_bit_image_and_the_colour_image_are_refused(self) -> None:
-        with pytest.raises(CloudReadError, match="8-bit image, 256 depth steps"):
-            read_cloud(REAL / "kinect2_8bit_01_open.png")
-        with pytest.raises(CloudReadError, match="colour image"):
-            read_cloud(REAL / "tauzn_01_closed_rgb.png")
-
-    def test_the_folder_lists_its_depth_images_and_not_the_colour_ones(self) -> None:
-        names = {path.name for path in find_clouds([REAL])}
-        assert {row["file"] for row in self._rows()} <= names
-        assert not any("_rgb" in name for name in names)
