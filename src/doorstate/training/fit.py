@@ -37,6 +37,7 @@ from doorstate.training.weights import WeightsCard, load_into, save_weights
 from doorstate.types import STATES
 
 _EVALUATION_BATCH = 32
+_TELL_EVERY_S = 1.0
 
 
 class RunConfig(BaseModel):
@@ -195,7 +196,7 @@ class _Trainer:
         per_epoch = max(1, len(loader) // recipe.batch_size)
         losses: list[float] = []
         self.network.train()
-        rate = 0.0
+        rate, told = 0.0, time.perf_counter()
         batches = loader.shuffled(recipe.batch_size, recipe.augmentation, (config.seed, config.fold, epoch))
         for iteration, batch in enumerate(batches, start=epoch * per_epoch):
             rate = learning_rate(recipe, iteration, per_epoch)
@@ -204,6 +205,9 @@ class _Trainer:
             momentum = batchnorm_momentum(recipe, iteration, per_epoch)
             if momentum is not None:
                 set_batchnorm(self.network, momentum=momentum)
+            if time.perf_counter() - told > _TELL_EVERY_S:
+                told = time.perf_counter()
+                self.run.write_position(iteration / per_epoch)
             losses.append(self._step(self.fabric.to_device(batch.points), self.fabric.to_device(batch.labels)))
         mean = float(np.mean(losses))
         if not math.isfinite(mean):

@@ -12,7 +12,7 @@ import numpy as np
 
 from doorstate.errors import RunError
 from doorstate.files import write_text
-from doorstate.simulation.manifest import write_csv
+from doorstate.simulation.manifest import read_csv, write_csv
 from doorstate.types import STATES
 
 
@@ -24,6 +24,7 @@ class RunFolder:
         self.config = path / "config.json"
         self.environment = path / "environment.json"
         self.log = path / "log.csv"
+        self.position = path / "position.txt"
         self.checkpoint = path / "checkpoint.pt"
         self.weights = path / "weights.safetensors"
         self.predictions = path / "predictions.csv"
@@ -49,6 +50,17 @@ class RunFolder:
         if not self.finished:
             write_json(self.environment, environment)
 
+    def write_position(self, epochs: float) -> None:
+        """Say how far the training is, in epochs; for whoever watches, nothing depends on it."""
+        write_text(self.position, f"{epochs:.3f}\n")
+
+    def read_position(self) -> float:
+        """How far the training is, in epochs; 0 if nobody knows."""
+        try:
+            return float(self.position.read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return 0.0
+
     def read_metrics(self) -> dict[str, Any]:
         """Metrics of a finished run."""
         return read_json(self.metrics)
@@ -56,6 +68,11 @@ class RunFolder:
     def write_log(self, lines: Sequence[Mapping[str, float]]) -> None:
         """Write one line per epoch."""
         write_csv(self.log, [{key: f"{value:.6g}" for key, value in line.items()} for line in lines])
+
+    def last_epoch_seconds(self) -> float:
+        """How long the newest epoch of the log took; 0 before the first."""
+        lines = read_csv(self.log) if self.log.is_file() else []
+        return float(lines[-1]["seconds"]) if lines else 0.0
 
     def write_predictions(self, samples: Sequence[str], labels: np.ndarray, probabilities: np.ndarray) -> None:
         """Write the test samples' states and probabilities (M, 3)."""
@@ -73,9 +90,10 @@ class RunFolder:
         )
 
     def finish(self, metrics: Mapping[str, Any]) -> None:
-        """Write the metrics, and drop the checkpoint that nobody needs any more."""
+        """Write the metrics, and drop what only a running training needs."""
         write_json(self.metrics, metrics)
         self.checkpoint.unlink(missing_ok=True)
+        self.position.unlink(missing_ok=True)
 
 
 def read_json(path: Path) -> dict[str, Any]:
