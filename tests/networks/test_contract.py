@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What every network promises, for all five."""
+
+from __future__ import annotations
+
+import pytest
+import torch
+from torch import Tensor
+
+from doorstate.errors import CloudContentError, ConfigError
+from doorstate.networks import create_network, list_networks
+from doorstate.networks.base import PointNetwork
+from doorstate.networks.layers import RowBatchNorm
+
+NAMES = ("pointnet", "pointnet2", "dgcnn", "pointcnn", "point2sequence")
+LABELS = torch.tensor([0, 2])
+# Parameters at 3 and at 40 classes.
+COUNTS = {
+    "pointnet": (3_470_540, 3_480_049),
+    "pointnet2": (1_466_179, 1_475_688),
+    "dgcnn": (1_800_067, 1_809_576),
+    "pointcnn": (592_199, 599_340),
+    "point2sequence": (1_835_907, 1_845_416),
+}
+
+
+def clouds(num_points: int, batch: int = 2, seed: int = 0) -> Tensor:
+    return torch.rand(batch, num_points, 3, generator=torch.Generator().manual_seed(seed)) * 2 - 1
+
+
+@pytest.fixture(params=NAMES)
+def network(request: pytest.FixtureRequest) -> PointNetwork:
+    """A network whose running statistics and scales are not those of an untrained one."""
+    network = create_network(request.param)
+    for module in network.modules():
+        if isinstance(module, RowBatchNorm):
+            torch.nn.init.uniform_(module.weight, -1, 1)
+            torch.nn.init.uniform_(module.running_mean, -0.1, 0.1)
+            torch.nn.init.uniform_(module.running_var, 0.5, 1.5)
+    return network
+
+
+def test_names() -> None:
+    assert tuple(list_networks()) == NAMES
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_number_of_parameters(name: str) -> None:
+    counts = tuple(sum(p.numel() for p in create_network(name, classes).parameters()) for classes in (3, 40))
+    assert counts == COUNTS[name]
+
+
+def test_parameters_of_multi_scale_grouping() -> None:
+    counts = [
+        sum(p.numel() for p in create_network("pointnet2", c, variant="msg").parameters()) for c in (3, 40)
+    ]
+    assert counts == [1_737_859, 1_747_368]
+
+
+def test_a_typo_is_told_the_name_it_meant() -> None:
+    with pytest.raises(ConfigError, match="'pointnet3': did you mean 'pointnet"):
+        create_network("pointnet3")
+    with pytest.raises(ConfigError, match="known are pointnet, pointnet2"):
+        create_network("zzz")
+    with pytest.raises(ConfigError, match="no option 'kk': known are k"):
+        create_network("dgcnn", kk=3)
+
+
+@pytest.mark.parametrize("num_points", [128, 256, 512, 1024])
+def test_logits_at_every_resolution(network: PointNetwork, num_points: int) -> None:
+    with torch.inference_mode():
+        logits = network.eval()(clouds(num_points, batch=1))
+    assert logits.shape == (1, 3)
+    assert logits.dtype == torch.float32
+    assert logits.isfinite().all()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_number_of_classes(name: str) -> None:
+    network = create_network(name, 5)
+    loss, logits = network.training_loss(clouds(128), LABELS)
+    assert loss.shape == ()
+    assert logits.shape == (2, 5)
+    assert network(clouds(128)).shape == (2, 5)  # while training
+
+
+def test_features_then_head_is_forward(network: PointNetwork) -> None:
+    network.eval()
+    points = clouds(128)
+    features = network.features(points)
+    assert features.shape == (2, network.feature_size)
+    torch.testing.assert_close(network.head(features), network(points))
+
+
+def test_evaluation_is_deterministic_and_clouds_are_independent(network: PointNetwork) -> None:
+    network.eval()
+    points = clouds(160, batch=3)
+    with torch.inference_mode():
+        together = network(points)
+        assert torch.equal(network(points), together)
+        alone = torch.cat([network(cloud.unsqueeze(0)) for cloud in points])
+    torch.testing.assert_close(alone, together, rtol=1e-4, atol=1e-4)
+
+
+def test_state_dict_round_trip(network: PointNetwork) -> None:
+    twin = type(network)()
+    points = clouds(128)
+    assert not torch.equal(twin.eval()(points), network.eval()(points))
+    twin.load_state_dict(network.state_dict())
+    assert torch.equal(twin(points), network(points))
+
+
+@pytest.mark.parametrize("autocast", [False, True])
+def test_every_parameter_gets_a_finite_gradient(network: PointNetwork, autocast: bool) -> None:
+    with torch.autocast("cpu", dtype=torch.bfloat16, enabled=autocast):
+        loss, logits = network.training_loss(clouds(128), LABELS, label_smoothing=0.1)
+    assert loss.dtype == logits.dtype == torch.float32
+    loss.backward()
+    for name, parameter in network.named_parameters():
+        assert parameter.grad is not None, name
+        assert parameter.grad.isfinite().all(), name
+
+
+def test_autocast_changes_little_in_evaluation(network: PointNetwork) -> None:
+    network.eval()
+    points = clouds(256)
+    with torch.inference_mode():
+        exact = network.features(points)
+        with torch.autocast("cpu", dtype=torch.bfloat16):
+            rounded = network.features(points).float()
+            assert network(points).dtype == torch.float32
+    assert (rounded - exact).norm() / exact.norm() < 0.05
+
+
+def test_label_smoothing_is_spread_over_all_classes() -> None:
+    network = create_network("dgcnn").eval()
+    points = clouds(128)
+    loss, logits = network.training_loss(points, LABELS, label_smoothing=0.2)
+    target = torch.full((2, 3), 0.2 / 3)
+    target[[0, 1], LABELS] = 1 - 0.2 + 0.2 / 3  # 0.8667, 0.0667, 0.0667
+    expected = -(target * logits.log_softmax(-1)).sum(-1).mean()
+    torch.testing.assert_close(loss, expected)
+    # The formula of DGCNN's authors, 0.8, 0.1, 0.1, is the same with eps * C/(C - 1) = 0.3.
+    loss, _ = network.training_loss(points, LABELS, label_smoothing=0.3)
+    target = torch.full((2, 3), 0.1)
+    target[[0, 1], LABELS] = 0.8
+    torch.testing.assert_close(loss, -(target * logits.log_softmax(-1)).sum(-1).mean())
+
+
+@pytest.mark.parametrize("shape", [(2, 127, 3), (2, 128, 4), (128, 3)])
+def test_unusable_points_are_refused(network: PointNetwork, shape: tuple[int, ...]) -> None:
+    with pytest.raises(CloudContentError, match="at least 128 points"):
+        network(torch.zeros(shape))
+    with pytest.raises(CloudContentError, match="at least 128 points"):
+        network.training_loss(torch.zeros(shape), LABELS)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_batchnorm_epsilon_is_an_option(name: str) -> None:
+    for eps, network in ((1e-5, create_network(name)), (1e-3, create_network(name, batchnorm_eps=1e-3))):
+        norms = [m for m in network.modules() if isinstance(m, torch.nn.BatchNorm1d)]
+        assert {(m.eps, m.momentum) for m in norms} == {(eps, 0.1)}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_network_is_one_graph_for_any_batch(name: str) -> None:
+    network = create_network(name).eval()
+    batch = torch.export.Dim("batch")
+    program = torch.export.export(network, (clouds(128),), dynamic_shapes=({0: batch},))
+    points = clouds(128, batch=3, seed=1)
+    torch.testing.assert_close(program.module()(points), network(points))

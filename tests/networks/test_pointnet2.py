@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: Apache-2.0
+"""PointNet++: set abstraction against its plain twin, both variants, what moves and what does not."""
+
+from __future__ import annotations
+
+import plain
+import pytest
+import torch
+from torch import Tensor, nn
+
+from doorstate.errors import ConfigError
+from doorstate.networks.pointnet2 import VARIANTS, PointNet2, Scale, SetAbstraction
+
+SCALES = (Scale(0.5, 4, (6, 7, 8)), Scale(1, 8, (5, 6, 9)))
+
+
+def clouds(batch: int = 2, num_points: int = 128, size: float = 1.0) -> Tensor:
+    return (torch.rand(batch, num_points, 3, generator=torch.Generator().manual_seed(0)) * 2 - 1) * size
+
+
+def test_variants_as_published() -> None:
+    assert [[s[1:] for s in level] for level in VARIANTS["ssg"].levels] == [
+        [(32, (64, 64, 128))],
+        [(64, (128, 128, 256))],
+    ]
+    network = PointNet2(variant="msg")
+    assert network.level1.balls == [(0.1, 16), (0.2, 32), (0.4, 128)]
+    assert network.level2.balls == [(0.2, 32), (0.4, 64), (0.8, 128)]
+    assert [network.level1.out_channels, network.level2.out_channels] == [320, 640]
+    for variant, rate in (("ssg", 0.5), ("msg", 0.6)):
+        assert [m.p for m in PointNet2(variant=variant).modules() if isinstance(m, nn.Dropout)] == [
+            rate,
+            rate,
+        ]
+
+
+@pytest.mark.parametrize("dtype", [torch.float64, torch.float32])
+@pytest.mark.parametrize("num_features", [0, 5])
+def test_set_abstraction_equals_its_plain_twin(dtype: torch.dtype, num_features: int) -> None:
+    points = clouds(num_points=40)
+    features = torch.randn(2, 40, num_features, generator=torch.Generator().manual_seed(1))
+
+    def fast(module: nn.Module, leaves: list[Tensor]) -> Tensor:
+        centres, pooled = module(leaves[0], leaves[1] if num_features else None)
+        return torch.cat([centres, pooled], dim=-1)
+
+    def literal(module: nn.Module, leaves: list[Tensor]) -> Tensor:
+        centres = leaves[0][:, :10]
+        out = [centres]
+        for (radius, num_samples), mlp in zip(module.balls, module.mlps, strict=True):
+            indices = plain.ball_query(centres, leaves[0], radius, num_samples)
+            offsets = plain.gather(leaves[0], indices) - centres.unsqueeze(2)
+            rows = torch.cat([offsets, *(plain.gather(leaf, indices) for leaf in leaves[1:])], dim=-1)
+            out.append(plain.pooled_mlp(rows, mlp))
+        return torch.cat(out, dim=-1)
+
+    module = SetAbstraction(10, 0.8, SCALES, num_features)
+    plain.assert_twins(module, fast, literal, [points, features] if num_features else [points], dtype)
+
+
+@pytest.mark.parametrize(("variant", "channels"), [("ssg", (128, 256)), ("msg", (320, 640))])
+def test_shapes_of_the_levels(variant: str, channels: tuple[int, int]) -> None:
+    network = PointNet2(variant=variant).eval()
+    with torch.no_grad():
+        centres, features = network.level1(clouds(1, 600), None)
+        assert centres.shape == (1, 512, 3)
+        assert features.shape == (1, 512, channels[0])
+        centres, features = network.level2(centres, features)
+        assert features.shape == (1, 128, channels[1])
+        assert network.level3(centres, features).shape == (1, 1024)
+    assert torch.equal(centres, clouds(1, 600)[:, :128])  # the prefix, in order
+
+
+def test_multi_scale_grouping_trains() -> None:
+    network = PointNet2(variant="msg", num_samples=8)
+    assert {n for level in (network.level1, network.level2) for _, n in level.balls} == {8}
+    loss, _ = network.training_loss(clouds(), torch.tensor([0, 1]))
+    loss.backward()
+    assert all(p.grad is not None and p.grad.isfinite().all() for p in network.parameters())
+
+
+def test_radii_are_in_the_unit_of_the_points() -> None:
+    unit, metric = (PointNet2(radii=radii).eval() for radii in ((0.2, 0.4), (0.6, 1.2)))
+    metric.load_state_dict(unit.state_dict())
+    with torch.no_grad():
+        metric.level1.mlps[0].mlp.first.weight /= 3  # three input channels, all coordinates
+        small, large = unit.level1(clouds(), None)[1], metric.level1(clouds() * 3, None)[1]
+    torch.testing.assert_close(small, large)
+
+
+def test_a_shift_reaches_only_the_last_level() -> None:
+    network = PointNet2().double().eval()
+    points = clouds().double()
+    moved = points + torch.tensor([0.5, -1.0, 2.0])
+    torch.testing.assert_close(network.level1(points, None)[1], network.level1(moved, None)[1])
+    assert (network(points) - network(moved)).abs().max() > 1e-3
+
+
+def test_order_after_the_centres_matters_only_to_full_balls() -> None:
+    points = clouds(1, 700, size=2.0)
+    tail = 512 + torch.randperm(188, generator=torch.Generator().manual_seed(1))
+    shuffled = points[:, torch.cat([torch.arange(512), tail])]
+    roomy, full = PointNet2().eval(), PointNet2(radii=(1.5, 3.0)).eval()
+    full.load_state_dict(roomy.state_dict())
+    with torch.no_grad():
+        torch.testing.assert_close(roomy(points), roomy(shuffled), rtol=0, atol=1e-6)
+        assert (full(points) - full(shuffled)).abs().max() > 1e-6
+
+
+def test_an_unknown_variant_is_refused() -> None:
+    with pytest.raises(ConfigError, match="no variant 'mrg': use one of ssg, msg"):
+        PointNet2(variant="mrg")
