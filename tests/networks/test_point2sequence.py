@@ -118,6 +118,16 @@ def test_attention_reaches_the_output_unless_as_released(region_feature: str) ->
     assert reached == [region_feature == "attention"] * 4
 
 
+@pytest.mark.parametrize("region_feature", ["attention", "released"])
+def test_region_feature(region_feature: str) -> None:
+    network = Point2Sequence(region_feature=region_feature).eval()
+    points = clouds()
+    memory, query = network.encode(network.sequence(points))
+    region = network.attention(memory, query) if region_feature == "attention" else query
+    expected = network.globals(points, network.region(region))
+    torch.testing.assert_close(network.features(points), expected)
+
+
 def test_dilated_areas_shrink_when_points_are_few() -> None:
     network = Point2Sequence(dilation=4)
     many, few = clouds(1, 600), clouds(1, 300)

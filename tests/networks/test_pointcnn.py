@@ -53,6 +53,17 @@ def test_shapes_of_neighbours_matrices_and_features() -> None:
     assert torch.equal(centres[3], clouds(1, 1024)[:, :128])
 
 
+def test_matrices_are_predicted_from_exact_coordinates_under_autocast() -> None:
+    transform = PointCNN().levels[0].transform
+    seen: list[Tensor] = []
+    transform.norm0.register_forward_pre_hook(lambda module, args: seen.append(args[0]))
+    offsets = torch.randn(1, 20, 8, 3)
+    transform(offsets)
+    with torch.autocast("cpu", dtype=torch.bfloat16):
+        transform(offsets)
+    assert torch.equal(seen[0], seen[1])
+
+
 def test_lift_widths_and_multipliers() -> None:
     levels = PointCNN().levels
     assert [level.lift[0][0].out_features for level in levels] == [24, 12, 24, 48]

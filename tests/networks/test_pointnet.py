@@ -38,6 +38,17 @@ def test_points_are_row_vectors_to_the_transforms() -> None:
         torch.testing.assert_close(turned, network(torch.stack([-y, x, z], dim=-1)))
 
 
+def test_feature_transform_acts_on_row_vectors() -> None:
+    network = PointNet().eval()
+    seen: list[Tensor] = []
+    network.encoder.register_forward_pre_hook(lambda module, args: seen.append(args[0]))
+    swap_cycle = torch.eye(64).roll(1, dims=1)  # moves channel i to i + 1
+    with torch.no_grad():
+        network.feature_transform.output.bias.copy_((swap_cycle - torch.eye(64)).flatten())
+        network(clouds())
+        torch.testing.assert_close(seen[0], network.local(clouds()).roll(1, dims=-1))
+
+
 def test_penalty_by_hand() -> None:
     assert orthogonality_penalty(torch.eye(64).expand(3, -1, -1)) == 0
     assert orthogonality_penalty(torch.zeros(3, 64, 64)) == 3 * 32
