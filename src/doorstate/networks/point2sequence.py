@@ -79,8 +79,8 @@ class Point2Sequence(PointNetwork):
 
     Args:
         num_classes: number of logits.
-        region_feature: "attention", the attention vector, as the paper describes; "released", the decoder's
-            hidden state, as in the authors' code, where attention never reaches the output.
+        region_feature: "attention", the attention vector; "released", the decoder's hidden state, as in the
+            authors' code, where attention never reaches the output.
         dilation: every how many of the nearest points belong to an area.
         batchnorm_eps: epsilon of every batch normalisation; 1e-3 in the original.
 

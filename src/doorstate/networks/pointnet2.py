@@ -37,7 +37,7 @@ VARIANTS = {
             (Scale(0.5, 16, (32, 32, 64)), Scale(1, 32, (64, 64, 128)), Scale(2, 128, (64, 96, 128))),
             (Scale(0.5, 32, (64, 64, 128)), Scale(1, 64, (128, 128, 256)), Scale(2, 128, (128, 128, 256))),
         ),
-        dropout=0.6,  # the released code; the paper has 0.5
+        dropout=0.6,
     ),
 }
 
