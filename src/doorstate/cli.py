@@ -33,17 +33,25 @@ app = typer.Typer(
 
 # What a cloud file does not say about itself: the same options for `predict` and `prepare`.
 _CAMERA = "Reading clouds"
-Frame = Annotated[str, typer.Option(help="Frame of cloud files: body (x forward, y left, z up) or optical (z forward, y down).")]
-Roll = Annotated[int, typer.Option(help="How far the camera was turned clockwise, seen from behind: 0, 90, 180, 270.")]
+Frame = Annotated[
+    str,
+    typer.Option(help="Frame of cloud files: body (x forward, y left, z up) or optical (z forward, y down)."),
+]
+Roll = Annotated[
+    int, typer.Option(help="How far the camera was turned clockwise, seen from behind: 0, 90, 180, 270.")
+]
 Units = Annotated[str, typer.Option(help="Unit of cloud files: m, dm, cm, mm or km.")]
 DepthScale = Annotated[float, typer.Option(help="Metres per unit of depth images.")]
 IntrinsicsFile = Annotated[
     Path | None, typer.Option("--intrinsics", help="Camera of depth images: JSON or ROS camera_info YAML.")
 ]
-Focal = Annotated[float | None, typer.Option(help="Focal length or centre in pixels, in place of --intrinsics.")]
+Focal = Annotated[
+    float | None, typer.Option(help="Focal length or centre in pixels, in place of --intrinsics.")
+]
 Workers = Annotated[int | None, typer.Option(help="Processes; all processors if not given.", min=1)]
 Changes = Annotated[
-    list[str] | None, typer.Option("--set", help="A field of the recipe, such as --set batch_size=32; repeatable.")
+    list[str] | None,
+    typer.Option("--set", help="A field of the recipe, such as --set batch_size=32; repeatable."),
 ]
 _UNITS_M = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "km": 1000.0}
 
@@ -52,7 +60,9 @@ _UNITS_M = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "km": 1000.0}
 def simulate(
     out: Annotated[Path, typer.Option(help="Folder to make, or to go on with.")],
     preset: Annotated[str, typer.Option(help="ogurob, ogurob-fixed or ogurob-away.")] = "ogurob",
-    poses: Annotated[int | None, typer.Option(help="How many of the 1353 robot poses; all if not given.")] = None,
+    poses: Annotated[
+        int | None, typer.Option(help="How many of the 1353 robot poses; all if not given.")
+    ] = None,
     seed: Annotated[int, typer.Option(help="Everything random is drawn from it.", min=0)] = 0,
     keep: Annotated[
         list[str] | None, typer.Option(help="Raw files to keep: pcd, depth, image; repeatable.")
@@ -66,7 +76,8 @@ def simulate(
       doorstate simulate --out data/ogurob
       doorstate simulate --out data/small --poses 60 --keep pcd --keep image
     """
-    from doorstate.console import err, out as stdout, print_table, progress_bar
+    from doorstate.console import err, print_table, progress_bar
+    from doorstate.console import out as stdout
     from doorstate.dataset.strata import BANDS, REGIONS, distance_band, region
     from doorstate.simulation.generate import find_preset
     from doorstate.simulation.run import RAW_KINDS, SimulationSettings, simulate_dataset
@@ -85,13 +96,19 @@ def simulate(
         "Clouds by distance (m) and angle region (Table 1; a third of each per state)",
         ["distance", *REGIONS, "all"],
         [
-            [band, *(str(counts.count((band, name))) for name in REGIONS), str(sum(c[0] == band for c in counts))]
+            [
+                band,
+                *(str(counts.count((band, name))) for name in REGIONS),
+                str(sum(c[0] == band for c in counts)),
+            ]
             for band in BANDS
         ],
     )
     twins = sum(bool(row["same_image_as"]) for row in rows)
     if twins:
-        err.print(f"{twins} frames look the same in another state: nobody can tell them apart (same_image_as)")
+        err.print(
+            f"{twins} frames look the same in another state: nobody can tell them apart (same_image_as)"
+        )
     stdout.print(f"{len(rows)} samples in {out}; next: doorstate prepare {out} --out {out}-4096")
 
 
@@ -101,7 +118,8 @@ def prepare(
     out: Annotated[Path, typer.Option(help="Folder to make, or to go on with.")],
     points: Annotated[int, typer.Option(help="Points kept of every cloud.", min=128)] = 4096,
     poses: Annotated[
-        Path | None, typer.Option(help="CSV of poses for class folders: file,x_m,y_m or file,distance_m,robot_angle_deg.")
+        Path | None,
+        typer.Option(help="CSV of poses for class folders: file,x_m,y_m or file,distance_m,robot_angle_deg."),
     ] = None,
     frame: Frame = "body",
     roll: Roll = 0,
@@ -121,7 +139,8 @@ def prepare(
       doorstate prepare data/ogurob --out data/ogurob-4096
       doorstate prepare ~/OGUROB_DOORS --poses poses.csv --frame optical --out data/original
     """
-    from doorstate.console import err, out as stdout, progress_bar
+    from doorstate.console import err, progress_bar
+    from doorstate.console import out as stdout
     from doorstate.dataset.prepare import prepare_dataset
 
     options = _read_options(frame, roll, units, depth_scale, intrinsics, (fx, fy, cx, cy))
@@ -156,7 +175,8 @@ def train(
       doorstate train pointnet2 --data data/ogurob-4096 --points 1024 --epochs 12 --out runs/first
       doorstate train dgcnn --data data/ogurob-4096 --recipe authors --set batch_size=16 --out runs/dgcnn
     """
-    from doorstate.console import live_runs, out as stdout
+    from doorstate.console import live_runs
+    from doorstate.console import out as stdout
     from doorstate.dataset.splits import draw_splits, write_splits
     from doorstate.dataset.store import open_dataset
     from doorstate.training.comparison import Run, load_experiment, train_one
@@ -188,12 +208,20 @@ def train(
 
 @app.command()
 def compare(
-    experiment: Annotated[Path | None, typer.Argument(help="An experiment file; options win over it.")] = None,
-    out: Annotated[Path | None, typer.Option(help="Folder of the comparison; runs/NAME if not given.")] = None,
+    experiment: Annotated[
+        Path | None, typer.Argument(help="An experiment file; options win over it.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder of the comparison; runs/NAME if not given.")
+    ] = None,
     data: Annotated[Path | None, typer.Option(help="A prepared data set.")] = None,
     protocol: Annotated[str | None, typer.Option(help="paper or by-pose.")] = None,
-    networks: Annotated[str | None, typer.Option(help="Names, separated by commas; all five if not given.")] = None,
-    folds: Annotated[int | None, typer.Option(help="How many of the five folds to run.", min=1, max=5)] = None,
+    networks: Annotated[
+        str | None, typer.Option(help="Names, separated by commas; all five if not given.")
+    ] = None,
+    folds: Annotated[
+        int | None, typer.Option(help="How many of the five folds to run.", min=1, max=5)
+    ] = None,
     points: Annotated[int | None, typer.Option(help="Points of every cloud.", min=128)] = None,
     seed: Annotated[int | None, typer.Option(min=0)] = None,
     recipe: Annotated[str | None, typer.Option(help="common or authors.")] = None,
@@ -252,7 +280,8 @@ def report(
       doorstate report runs/one-fold
       doorstate report data/ogurob-4096 --out reports/data
     """
-    from doorstate.console import err, out as stdout
+    from doorstate.console import err
+    from doorstate.console import out as stdout
     from doorstate.evaluation.report import write_dataset_figures, write_everything
 
     target = out or folder / "report"
@@ -268,8 +297,12 @@ def report(
 def predict(
     files: Annotated[list[Path], typer.Argument(help="Clouds, depth images, or folders of them.")],
     network: Annotated[str, typer.Option(help="Network whose packaged weights to use.")] = "pointnet2",
-    weights: Annotated[Path | None, typer.Option(help="A weights file of your own, in place of --network.")] = None,
-    points: Annotated[int | None, typer.Option(help="Points to look at; as trained if not given.", min=128)] = None,
+    weights: Annotated[
+        Path | None, typer.Option(help="A weights file of your own, in place of --network.")
+    ] = None,
+    points: Annotated[
+        int | None, typer.Option(help="Points to look at; as trained if not given.", min=128)
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object a line.")] = False,
     frame: Frame = "body",
     roll: Roll = 0,
@@ -330,16 +363,17 @@ def info(as_json: Annotated[bool, typer.Option("--json", help="As one JSON objec
       doorstate info
       doorstate info --json
     """
-    from doorstate.clouds.sampling import fpsample
+    from doorstate.clouds.sampling import HAS_FPSAMPLE
     from doorstate.console import print_table
     from doorstate.deployment.predictor import packaged_networks
     from doorstate.networks import create_network, list_networks
     from doorstate.training.environment import describe_environment
 
-    environment = describe_environment() | {"fpsample": fpsample is not None}
+    environment = describe_environment() | {"fpsample": HAS_FPSAMPLE}
     packaged = packaged_networks()
     networks = [
-        (name, sum(p.numel() for p in create_network(name).parameters()), name in packaged) for name in list_networks()
+        (name, sum(p.numel() for p in create_network(name).parameters()), name in packaged)
+        for name in list_networks()
     ]
     if as_json:
         listed = [{"network": n, "parameters": p, "packaged_weights": w} for n, p, w in networks]
@@ -370,19 +404,19 @@ def _read_options(
     intrinsics_file: Path | None,
     flags: tuple[float | None, float | None, float | None, float | None],
 ) -> ReadOptions:
-    from doorstate.clouds.camera import Intrinsics, read_intrinsics
+    from doorstate.clouds.camera import Intrinsics, Pinhole, read_intrinsics
     from doorstate.clouds.io import ReadOptions
 
     if units not in _UNITS_M:
         raise ConfigError(f"--units {units}: choose one of {', '.join(_UNITS_M)}")
-    intrinsics = None
+    intrinsics: Intrinsics | Pinhole | None = None
     if intrinsics_file is not None:
         intrinsics = read_intrinsics(intrinsics_file)
     elif any(value is not None for value in flags):
         fx, fy, cx, cy = flags
         if fx is None or fy is None or cx is None or cy is None:
             raise ConfigError("--fx, --fy, --cx and --cy belong together: give all four")
-        intrinsics = Intrinsics(None, None, fx, fy, cx, cy)
+        intrinsics = Pinhole(fx, fy, cx, cy)
     return ReadOptions(frame, roll, intrinsics, depth_scale, _UNITS_M[units])  # type: ignore[arg-type]
 
 

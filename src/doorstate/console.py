@@ -10,7 +10,14 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.live import Live
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 from rich.table import Table
 
 if TYPE_CHECKING:
@@ -33,7 +40,9 @@ def _columns() -> tuple[TextColumn, BarColumn, MofNCompleteColumn, TimeElapsedCo
 @contextmanager
 def progress_bar(description: str) -> Iterator[Callable[[int, int], None]]:
     """A bar on standard error; yields `update(done, total)`. Where nobody looks it prints nothing."""
-    with Progress(*_columns(), console=err, transient=not err.is_terminal, disable=not err.is_terminal) as progress:
+    with Progress(
+        *_columns(), console=err, transient=not err.is_terminal, disable=not err.is_terminal
+    ) as progress:
         task = progress.add_task(description, total=None)
 
         def update(done: int, total: int) -> None:
@@ -54,7 +63,9 @@ def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]
 
 
 @contextmanager
-def live_runs(runs: Sequence[Run], epochs: Mapping[str, int], jobs: int) -> Iterator[Callable[[int, int], None]]:
+def live_runs(
+    runs: Sequence[Run], epochs: Mapping[str, int], jobs: int
+) -> Iterator[Callable[[int, int], None]]:
     """Show how far every run is, read from the run folders once a second; yields `update(done, total)`.
 
     Where nobody looks, finished runs are counted in plain lines instead.
@@ -77,7 +88,9 @@ class _RunWatch:
 
     def table(self) -> Table:
         folds = sorted({run.fold for run in self._runs})
-        table = Table(title=f"macro-F1 on the test fold, or epochs done{self._time_left()}", title_justify="left")
+        table = Table(
+            title=f"macro-F1 on the test fold, or epochs done{self._time_left()}", title_justify="left"
+        )
         table.add_column("network")
         for fold in folds:
             table.add_column(f"fold {fold}", justify="right", min_width=11)

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The words of the library (docs/concepts.md): states, parts, array aliases.
 
-Frame of every cloud: sensor frame, gravity-aligned, x forward, y left, z up (ROS REP 103), origin at the camera, metres.
+Frame of every cloud: sensor frame, gravity-aligned, x forward, y left, z up (ROS REP 103), origin at the camera,
+metres.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from PIL import Image
 
-from doorstate.clouds.camera import Intrinsics
+from doorstate.clouds.camera import Intrinsics, Pinhole
 from doorstate.clouds.depth import depth_to_points
 from doorstate.clouds.io import CLOUD_SUFFIXES, ReadOptions, find_clouds, read_cloud
 from doorstate.clouds.pcd import write_pcd
@@ -151,6 +151,13 @@ def test_depth_without_a_camera_names_the_flags(tmp_path: Path, valid: dict[str,
     with pytest.raises(CameraError, match=r"20 x 4 .*--intrinsics FILE or --fx --fy --cx --cy") as caught:
         read_cloud(path)
     assert _one_line(caught.value, path)
+
+
+def test_a_pinhole_takes_every_image_size(tmp_path: Path) -> None:
+    path = _write(tmp_path, "depth.png", _saved(lambda f: Image.fromarray(DEPTH_MM).save(f, "PNG")))
+    pinhole = Pinhole(CAMERA.fx, CAMERA.fy, CAMERA.cx, CAMERA.cy)
+    exact = read_cloud(path, ReadOptions(intrinsics=CAMERA))
+    np.testing.assert_array_equal(read_cloud(path, ReadOptions(intrinsics=pinhole)), exact)
 
 
 def test_depth_of_another_size_names_both_sizes(tmp_path: Path, valid: dict[str, bytes]) -> None:

@@ -7,7 +7,7 @@ import json
 import math
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import yaml
 
@@ -55,6 +55,15 @@ class Intrinsics:
                 f"the image has {width} x {height} pixels, the intrinsics are for "
                 f"{self.width} x {self.height}: give those of this image size"
             )
+
+
+class Pinhole(NamedTuple):
+    """Intrinsics in pixels of images of whatever size."""
+
+    fx: float
+    fy: float
+    cx: float
+    cy: float
 
 
 def read_intrinsics(path: Path) -> Intrinsics:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from doorstate.clouds.arrays import parse_npy, parse_npz
-from doorstate.clouds.camera import Intrinsics
+from doorstate.clouds.camera import Intrinsics, Pinhole
 from doorstate.clouds.depth import depth_to_points, points_from_optical, undo_roll
 from doorstate.clouds.pcd import parse_pcd
 from doorstate.clouds.ply import parse_ply
@@ -50,7 +50,7 @@ class ReadOptions:
         frame: frame of cloud files, `body` (x forward, y left, z up) or `optical` (x right, y down, z
             forward); depth images are always optical.
         roll_deg: how far the camera was turned clockwise, seen from behind: 0, 90, 180 or 270.
-        intrinsics: camera of depth images.
+        intrinsics: camera of depth images; a `Pinhole` takes every image size.
         depth_scale_m: metres per stored unit of integer depth images.
         units_m: metres per unit of cloud files and of floating point depth images (metres by ROS REP 118).
 
@@ -60,7 +60,7 @@ class ReadOptions:
 
     frame: Literal["body", "optical"] = "body"
     roll_deg: int = 0
-    intrinsics: Intrinsics | None = None
+    intrinsics: Intrinsics | Pinhole | None = None
     depth_scale_m: float = 0.001
     units_m: float = 1.0
 
@@ -157,17 +157,20 @@ def _read_bytes(path: Path) -> bytes:
 
 
 def _points_from_depth(stored: NDArray[Any], options: ReadOptions) -> Points:
-    if options.intrinsics is None:
-        height, width = stored.shape
+    height, width = stored.shape
+    intrinsics = options.intrinsics
+    if intrinsics is None:
         raise CameraError(
             f"a depth image ({width} x {height} pixels) needs the camera's intrinsics: "
             "give --intrinsics FILE or --fx --fy --cx --cy"
         )
+    if isinstance(intrinsics, Pinhole):
+        intrinsics = Intrinsics(width, height, *intrinsics)
     scale_m = options.units_m if stored.dtype.kind == "f" else options.depth_scale_m
     depth_m = stored.astype(np.float64) * scale_m
     if stored.dtype.newbyteorder("=") == np.uint16:
         depth_m[stored == _NO_RETURN] = np.nan
-    return depth_to_points(depth_m, options.intrinsics, options.roll_deg).reshape(-1, 3)  # (H * W, 3)
+    return depth_to_points(depth_m, intrinsics, options.roll_deg).reshape(-1, 3)  # (H * W, 3)
 
 
 def _points_from_rows(stored: NDArray[Any], options: ReadOptions) -> Points:

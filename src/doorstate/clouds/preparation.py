@@ -14,8 +14,11 @@ from doorstate.types import Indices, Points
 NUM_POINTS = 4096  # the paper's cloud size
 MIN_POINTS = 128  # fewer cannot fill the largest neighbourhood of a network
 SCALE_M = 3.0  # half the depth of a typical frame: networks were designed for clouds of about unit radius
-_LARGEST_MEDIAN_M = 50.0  # no depth camera reaches this far; a cloud in millimetres has medians in the thousands
+_LARGEST_MEDIAN_M = (
+    50.0  # no depth camera reaches this far; a cloud in millimetres has medians in the thousands
+)
 _SMALLEST_MEDIAN_M = 0.02
+_NO_RETURN = 1e6  # in any unit; some drivers write FLT_MAX where nothing returned
 
 
 class PreparedCloud(NamedTuple):
@@ -28,10 +31,11 @@ class PreparedCloud(NamedTuple):
 def prepare_cloud(points: Points, count: int = NUM_POINTS) -> PreparedCloud:
     """Drop unmeasured points, check what is left, and keep `count` points in farthest-point order.
 
-    A cloud with fewer than `count` measured points gives all of them, each once; points are never repeated.
+    A cloud with fewer than `count` distinct points gives all of them, each once; points are never repeated.
 
     Args:
-        points: (N, 3) or organized (H, W, 3) metres, NaN or infinite where nothing was measured.
+        points: (N, 3) or organized (H, W, 3) metres; NaN, infinite, (0, 0, 0) or beyond all measure where nothing
+            was measured.
         count: how many points to keep.
 
     Raises:
@@ -40,16 +44,23 @@ def prepare_cloud(points: Points, count: int = NUM_POINTS) -> PreparedCloud:
     flat = np.asarray(points, dtype=np.float32).reshape(-1, 3)
     if len(flat) == 0:
         raise CloudContentError("the cloud is empty: it holds no points")
-    measured = np.flatnonzero(np.isfinite(flat).all(axis=1))
-    if len(measured) == 0:
+    returned = (np.abs(flat) < _NO_RETURN).all(axis=1)
+    if not returned.any():
         raise CloudContentError(f"none of the {len(flat)} points was measured: all are NaN or infinite")
+    measured = np.flatnonzero(returned & flat.any(axis=1))
+    if len(measured) == 0:
+        raise CloudContentError(
+            f"all {np.count_nonzero(returned)} measured points lie at the origin: the cloud holds no surface"
+        )
     clean = flat[measured]
-    if not clean.any():
-        raise CloudContentError(f"all {len(clean)} measured points lie at the origin: the cloud holds no surface")
     if len(clean) < MIN_POINTS:
         raise CloudContentError(f"too few points: {len(clean)} measured, at least {MIN_POINTS} are needed")
     _check_units(clean)
-    chosen = farthest_point_indices(clean, min(count, len(clean)))
+    chosen = _without_repeats(farthest_point_indices(clean, min(count, len(clean))))
+    if len(chosen) < min(count, MIN_POINTS):
+        raise CloudContentError(
+            f"too few points: {len(chosen)} distinct of {len(clean)} measured, at least {MIN_POINTS} are needed"
+        )
     return PreparedCloud(clean[chosen], measured[chosen])
 
 
@@ -63,7 +74,13 @@ def normalize(points: Points) -> Points:
         The same shape, float32, without unit.
     """
     centroid = points.mean(axis=-2, keepdims=True, dtype=np.float64).astype(np.float32)
-    return (points - centroid) / np.float32(SCALE_M)
+    normalized: Points = (points - centroid) / np.float32(SCALE_M)
+    return normalized
+
+
+def _without_repeats(chosen: Indices) -> Indices:
+    # Sampling repeats a point only when every distinct one is taken, so the repeats are the tail.
+    return chosen[: len(np.unique(chosen))]
 
 
 def _check_units(points: Points) -> None:

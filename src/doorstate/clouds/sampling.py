@@ -21,6 +21,8 @@ try:
 except ImportError:  # optional: it ships as source and needs a C++ compiler (docs/adr/0002)
     fpsample = None
 
+HAS_FPSAMPLE = fpsample is not None
+
 _POINTS_PER_LEAF = 2048  # of the k-d tree: fastest for fpsample at 300,000 points
 _POINTS_PER_BUCKET = 256  # of the NumPy form, likewise
 
@@ -50,14 +52,15 @@ def farthest_point_indices(points: Points, count: int) -> Indices:
     with_anchor = np.concatenate([(lowest - diagonal)[None], points])
     height = max(1, int(np.log2(len(with_anchor) / _POINTS_PER_LEAF)))
     choose = bucket_farthest_points if fpsample is None or len(with_anchor) < 4 else _fpsample_farthest_points
-    return choose(with_anchor, count + 1, height)[1:] - 1
-
+    chosen: Indices = choose(with_anchor, count + 1, height)
+    return chosen[1:] - 1
 
 
 def _fpsample_farthest_points(points: Points, count: int, height: int) -> Indices:
     # fpsample 1.0 looks `start_idx` up after its tree has reordered the points. A point that is lowest on every axis
     # stays in row 0 through every split, so with the anchor there the start is known.
-    return fpsample.bucket_fps_kdline_sampling(points, count, h=height, start_idx=0).astype(np.int64)
+    chosen: NDArray[np.uint64] = fpsample.bucket_fps_kdline_sampling(points, count, h=height, start_idx=0)
+    return chosen.astype(np.int64)
 
 
 def bucket_farthest_points(points: Points, count: int, height: int) -> Indices:
@@ -72,7 +75,9 @@ def bucket_farthest_points(points: Points, count: int, height: int) -> Indices:
         height: of the k-d tree that breaks ties.
     """
     tree_order = _tree_order(points, height)
-    rank = _buckets(points[tree_order], max(1, len(points) // _POINTS_PER_BUCKET))  # (buckets, m), -1 = padding
+    rank = _buckets(
+        points[tree_order], max(1, len(points) // _POINTS_PER_BUCKET)
+    )  # (buckets, m), -1 = padding
     padding = rank < 0
     grouped = points[tree_order[rank]]  # (buckets, m, 3)
     low = np.where(padding[..., None], np.inf, grouped).min(axis=1)
@@ -99,7 +104,8 @@ def _squared_distance(points: Points, origin: Points) -> NDArray[np.float32]:
     x = points[..., 0] - origin[0]
     y = points[..., 1] - origin[1]
     z = points[..., 2] - origin[2]
-    return x * x + y * y + z * z
+    squared: NDArray[np.float32] = x * x + y * y + z * z
+    return squared
 
 
 def _tree_order(points: Points, height: int) -> Indices:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections import Counter
 from pathlib import Path
@@ -19,7 +20,9 @@ _SPELLINGS = (
     (DoorState.CLOSED, re.compile(r"clos|shut|kapali")),
     (DoorState.OPEN, re.compile(r"open|acik")),
 )
-_WORDS = re.compile(r"(semi|half|ajar|partly|partially|partial|opened|open|closed|close|shut|doors?|is|the|aralik|kapali|acik)+")
+_WORDS = re.compile(
+    r"(semi|half|ajar|partly|partially|partial|opened|open|closed|close|shut|doors?|is|the|aralik|kapali|acik)+"
+)
 
 
 def state_of_folder(name: str) -> DoorState | None:
@@ -32,6 +35,8 @@ def state_of_folder(name: str) -> DoorState | None:
 
 def labelled_rows(root: Path, poses_csv: Path | None = None) -> list[dict[str, str]]:
     """One manifest row for every cloud under a class folder, with strata where its pose is known.
+
+    Whatever has a cloud's suffix there is taken for a cloud: a `notes.txt` is left out with its reason when it is read.
 
     Args:
         root: folder whose sub-folders, at any depth, are named after the states; the nearest one decides.
@@ -66,7 +71,9 @@ def labelled_rows(root: Path, poses_csv: Path | None = None) -> list[dict[str, s
             f"{root}: no clouds in folders named after the states (such as open, semi-open, closed)"
         )
     if unused:
-        raise DatasetError(f"{poses_csv}: {len(unused)} files are not in {root}, such as {sorted(unused)[0]!r}")
+        raise DatasetError(
+            f"{poses_csv}: {len(unused)} files are not in {root}, such as {sorted(unused)[0]!r}"
+        )
     _disambiguate(rows)
     return rows
 
@@ -105,6 +112,8 @@ def _strata(row: dict[str, str], where: str) -> dict[str, str]:
             raise DatasetError(f"{where}: needs x_m and y_m, or distance_m and robot_angle_deg")
     except ValueError as error:
         raise DatasetError(f"{where}: {error}") from error
+    if not (math.isfinite(distance_m) and math.isfinite(angle_deg)):
+        raise DatasetError(f"{where}: the pose must be finite numbers")
     return {
         "pose_id": pose_id,
         "distance_m": str(distance_m),

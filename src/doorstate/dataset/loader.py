@@ -33,7 +33,9 @@ class CloudLoader:
             ConfigError: more points are asked for than the data set holds.
         """
         if num_points > dataset.num_points:
-            raise ConfigError(f"{dataset.folder}: holds {dataset.num_points} points a cloud, not {num_points}")
+            raise ConfigError(
+                f"{dataset.folder}: holds {dataset.num_points} points a cloud, not {num_points}"
+            )
         indices = np.array([dataset.index_of(sample) for sample in sample_ids], dtype=np.int64)
         self.sample_ids = list(sample_ids)
         # A prefix of a farthest-point order is the farthest-point sample of that size.
@@ -49,7 +51,7 @@ class CloudLoader:
             yield self._batch(np.arange(start, min(start + batch_size, len(self))), None, None)
 
     def shuffled(self, batch_size: int, augmentation: Augmentation, seed: Sequence[int]) -> Iterator[Batch]:
-        """One training epoch: shuffled, augmented, the last part of a batch left out (batch statistics need its size)."""
+        """One training epoch: shuffled, augmented, an incomplete last batch left out."""
         rng = np.random.default_rng(seed)
         order = rng.permutation(len(self))
         batch_size = min(batch_size, len(self))

@@ -16,7 +16,15 @@ from doorstate import __version__
 from doorstate.clouds.io import ReadOptions, read_cloud
 from doorstate.clouds.preparation import NUM_POINTS, prepare_cloud
 from doorstate.dataset.class_folders import labelled_rows
-from doorstate.dataset.store import CLOUDS, DESCRIPTION, MANIFEST, PARTS, DatasetDescription, PreparedDataset, open_dataset
+from doorstate.dataset.store import (
+    CLOUDS,
+    DESCRIPTION,
+    MANIFEST,
+    PARTS,
+    DatasetDescription,
+    PreparedDataset,
+    open_dataset,
+)
 from doorstate.dataset.strata import distance_band, region
 from doorstate.errors import CameraError, CloudContentError, CloudError, ConfigError, DatasetError
 from doorstate.files import atomic_path, write_text
@@ -41,7 +49,7 @@ class PreparationSummary(NamedTuple):
 class _Piece(NamedTuple):
     rows: list[dict[str, str]]
     source: Path
-    count: int
+    num_points: int
     simulated: bool
     options: ReadOptions
 
@@ -49,7 +57,7 @@ class _Piece(NamedTuple):
 def prepare_dataset(
     source: Path,
     folder: Path,
-    count: int = NUM_POINTS,
+    num_points: int = NUM_POINTS,
     poses_csv: Path | None = None,
     options: ReadOptions | None = None,
     workers: int | None = None,
@@ -57,8 +65,8 @@ def prepare_dataset(
 ) -> PreparationSummary:
     """Prepare a simulated folder or class folders of clouds into `folder`.
 
-    A cloud with fewer than `count` measured points, or that cannot be read, is left out and listed in `rejected.csv`
-    with the reason: every cloud of a prepared data set has exactly `count` distinct points.
+    A cloud with fewer than `num_points` measured points, or that cannot be read, is left out and listed in `rejected.csv`
+    with the reason: every cloud of a prepared data set has exactly `num_points` distinct points.
 
     Raises:
         ConfigError: `folder` holds something prepared from another source or with other settings.
@@ -67,25 +75,29 @@ def prepare_dataset(
     options = options or ReadOptions()
     simulated = is_simulated(source)
     rows = _simulated_rows(source) if simulated else labelled_rows(source, poses_csv)
-    _claim(folder, {"source": str(source.resolve()), "count": count, "options": repr(options), "rows": _digest(rows)})
+    _claim(
+        folder,
+        {"source": str(source.resolve()), "num_points": num_points, "options": repr(options), "rows": _digest(rows)},
+    )
+    scratch = folder / "pieces"
     if (folder / DESCRIPTION).exists():
+        shutil.rmtree(scratch, ignore_errors=True)
         progress(1, 1)
         rejected = read_csv(folder / REJECTED) if (folder / REJECTED).exists() else []
         return PreparationSummary(open_dataset(folder), rejected)
 
     pieces = [
-        _Piece(rows[start : start + _SAMPLES_PER_PIECE], source, count, simulated, options)
+        _Piece(rows[start : start + _SAMPLES_PER_PIECE], source, num_points, simulated, options)
         for start in range(0, len(rows), _SAMPLES_PER_PIECE)
     ]
-    scratch = folder / "pieces"
     paths = piece_paths(scratch, len(pieces), ".npz")
     run_pieces(_prepare_piece, pieces, paths, workers or default_workers(), progress)
-    rejected = _assemble(folder, rows, paths, count, simulated)
+    rejected = _assemble(folder, rows, paths, num_points, simulated)
     name = read_settings(source).preset.name if simulated else source.resolve().name
     DatasetDescription(
         kind="simulated" if simulated else "imported",
         source=name,
-        num_points=count,
+        num_points=num_points,
         samples=len(rows) - len(rejected),
         doorstate_version=__version__,
     ).save(folder)
@@ -95,15 +107,17 @@ def prepare_dataset(
 
 def _simulated_rows(source: Path) -> list[dict[str, str]]:
     if not (source / SIMULATED_MANIFEST).exists():
-        raise DatasetError(f"{source}: the simulation is not complete; run 'doorstate simulate' again to finish it")
-    return [
-        row
-        | {
-            "distance_band": distance_band(float(row["distance_m"])),
-            "region": region(float(row["robot_angle_deg"])),
-        }
-        for row in read_csv(source / SIMULATED_MANIFEST)
-    ]
+        raise DatasetError(
+            f"{source}: the simulation is not complete; run 'doorstate simulate' again to finish it"
+        )
+    rows = []
+    for row in read_csv(source / SIMULATED_MANIFEST):
+        sample = unflatten(row)
+        rows.append(
+            row
+            | {"distance_band": distance_band(sample.distance_m), "region": region(sample.robot_angle_deg)}
+        )
+    return rows
 
 
 def _digest(rows: Sequence[dict[str, str]]) -> str:
@@ -129,10 +143,10 @@ def _prepare_piece(piece: _Piece, path: Path) -> None:
     for row in piece.rows:
         try:
             if piece.simulated:
-                cloud, part = _from_simulation(row, piece.count)
+                cloud, part = _from_simulation(row, piece.num_points)
                 parts.append(part)
             else:
-                cloud = _exactly(read_cloud(piece.source / row["file"], piece.options), piece.count)[0]
+                cloud = _exactly(read_cloud(piece.source / row["file"], piece.options), piece.num_points)[0]
             clouds.append(cloud)
             reasons.append("")
         except (CloudError, CameraError) as error:
@@ -140,29 +154,34 @@ def _prepare_piece(piece: _Piece, path: Path) -> None:
     with atomic_path(path) as temporary:
         np.savez(
             temporary,
-            clouds=np.array(clouds, dtype=np.float32).reshape(-1, piece.count, 3),
-            parts=np.array(parts, dtype=np.uint8).reshape(-1, piece.count),
+            clouds=np.array(clouds, dtype=np.float32).reshape(-1, piece.num_points, 3),
+            parts=np.array(parts, dtype=np.uint8).reshape(-1, piece.num_points),
             reasons=np.array(reasons, dtype=str),
         )
 
 
-def _from_simulation(row: dict[str, str], count: int) -> tuple[Points, np.ndarray]:
-    frame = replay(unflatten(row))
-    if hashlib.sha256(frame.cut.depth_m.tobytes()).hexdigest() != row["depth_sha256"]:
-        raise DatasetError(f"{row['sample_id']}: renders differently than its manifest says; simulate it again here")
-    cloud, indices = _exactly(frame.points, count)
+def _from_simulation(row: dict[str, str], num_points: int) -> tuple[Points, np.ndarray]:
+    sample = unflatten(row)
+    frame = replay(sample)
+    if hashlib.sha256(frame.cut.depth_m.tobytes()).hexdigest() != sample.depth_sha256:
+        raise DatasetError(
+            f"{sample.sample_id}: renders differently than its manifest says; simulate it again here"
+        )
+    cloud, indices = _exactly(frame.points, num_points)
     return cloud, frame.cut.part.reshape(-1)[indices]
 
 
-def _exactly(points: Points, count: int) -> tuple[Points, np.ndarray]:
-    prepared = prepare_cloud(points, count)
-    if len(prepared.points) < count:
-        raise CloudContentError(f"too few points: {len(prepared.points)} measured, {count} asked for (--points)")
+def _exactly(points: Points, num_points: int) -> tuple[Points, np.ndarray]:
+    prepared = prepare_cloud(points, num_points)
+    if len(prepared.points) < num_points:
+        raise CloudContentError(
+            f"too few points: {len(prepared.points)} measured, {num_points} asked for (--points)"
+        )
     return prepared
 
 
 def _assemble(
-    folder: Path, rows: list[dict[str, str]], paths: list[Path], count: int, simulated: bool
+    folder: Path, rows: list[dict[str, str]], paths: list[Path], num_points: int, simulated: bool
 ) -> list[dict[str, str]]:
     reasons: list[str] = []
     for path in paths:
@@ -177,10 +196,12 @@ def _assemble(
     if rejected:
         write_csv(folder / REJECTED, rejected)
     if not kept:
-        raise DatasetError(f"none of the {len(rows)} clouds could be prepared; the first: {rejected[0]['reason']}")
-    _concatenate(folder / CLOUDS, paths, "clouds", (len(kept), count, 3), np.float32)
+        raise DatasetError(
+            f"none of the {len(rows)} clouds could be prepared; the first: {rejected[0]['reason']}"
+        )
+    _concatenate(folder / CLOUDS, paths, "clouds", (len(kept), num_points, 3), np.float32)
     if simulated:
-        _concatenate(folder / PARTS, paths, "parts", (len(kept), count), np.uint8)
+        _concatenate(folder / PARTS, paths, "parts", (len(kept), num_points), np.uint8)
     write_csv(folder / MANIFEST, kept)
     return rejected
 

@@ -42,12 +42,19 @@ def draw_splits(rows: Sequence[Row], protocol: str, seed: int) -> list[dict[str,
         DatasetError: the protocol needs poses that the data set does not have, or there are too few samples.
     """
     if len(rows) < _TENTHS * 3:
-        raise DatasetError(f"{len(rows)} samples are too few for {NUM_FOLDS} folds: at least {_TENTHS * 3} are needed")
-    if protocol == "paper":
-        return _paper(rows, seed)
-    if protocol == "by-pose":
-        return _by_pose(rows, seed)
-    raise ConfigError(f"no protocol {protocol!r}: choose one of {', '.join(PROTOCOLS)}")
+        raise DatasetError(
+            f"{len(rows)} samples are too few for {NUM_FOLDS} folds: at least {_TENTHS * 3} are needed"
+        )
+    if protocol not in PROTOCOLS:
+        raise ConfigError(f"no protocol {protocol!r}: choose one of {', '.join(PROTOCOLS)}")
+    splits = _paper(rows, seed) if protocol == "paper" else _by_pose(rows, seed)
+    for fold, roles in enumerate(splits):
+        for role in ("train", "val", "test"):
+            if role not in roles.values():
+                raise DatasetError(
+                    f"{len(rows)} samples are too few for protocol {protocol}: nothing is left to {role} in fold {fold}"
+                )
+    return splits
 
 
 def _paper(rows: Sequence[Row], seed: int) -> list[dict[str, Role]]:
@@ -96,7 +103,8 @@ def _by_pose(rows: Sequence[Row], seed: int) -> list[dict[str, Role]]:
     roles: list[dict[str, Role]] = []
     for fold in range(NUM_FOLDS):
         tested = (block == 2 * fold) | (block == 2 * ((fold + 2) % NUM_FOLDS) + 1)
-        near = cKDTree(positions[tested]).query(positions)[0] <= EMBARGO_M + 1e-9
+        to_tested_m, _ = cKDTree(positions[tested]).query(positions)
+        near = np.asarray(to_tested_m) <= EMBARGO_M + 1e-9
         free = np.flatnonzero(~near)
         rng = np.random.default_rng([seed, fold])
         # One part in eight of what may be learned from: 10 to 70 as in the paper.

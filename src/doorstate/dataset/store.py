@@ -113,12 +113,14 @@ def open_dataset(folder: Path) -> PreparedDataset:
         parts = np.load(parts_path, mmap_mode="r", allow_pickle=False) if parts_path.is_file() else None
     except ValidationError as error:
         raise DatasetError(f"{path}: {error.errors()[0]['msg']}") from error
-    except (OSError, ValueError) as error:
-        raise DatasetError(f"{folder}: damaged ({error}); prepare it again") from error
+    except (OSError, ValueError, EOFError) as error:
+        raise DatasetError(f"{folder}: damaged ({error}); delete it and prepare it again") from error
     rows = read_csv(folder / MANIFEST)
     shape = (description.samples, description.num_points, 3)
     if clouds.shape != shape or clouds.dtype != np.float32 or len(rows) != description.samples:
-        raise DatasetError(f"{folder}: {CLOUDS} {clouds.shape} and {len(rows)} manifest rows, expected {shape}")
+        raise DatasetError(
+            f"{folder}: {CLOUDS} {clouds.shape} and {len(rows)} manifest rows, expected {shape}"
+        )
     if parts is not None and (parts.shape != shape[:2] or parts.dtype != np.uint8):
         raise DatasetError(f"{folder}: {PARTS} is {parts.shape}, expected {shape[:2]}")
     for column in ("sample_id", "state"):
@@ -126,5 +128,7 @@ def open_dataset(folder: Path) -> PreparedDataset:
             raise DatasetError(f"{folder / MANIFEST}: has no column {column!r}")
     unknown = {row["state"] for row in rows} - set(STATES)
     if unknown:
-        raise DatasetError(f"{folder / MANIFEST}: unknown state {sorted(unknown)[0]!r}, use {', '.join(STATES)}")
+        raise DatasetError(
+            f"{folder / MANIFEST}: unknown state {sorted(unknown)[0]!r}, use {', '.join(STATES)}"
+        )
     return PreparedDataset(folder, description, rows, clouds, parts)

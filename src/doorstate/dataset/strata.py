@@ -29,10 +29,12 @@ def region(robot_angle_deg: float) -> str:
     """Name of the region; an angle on an inner edge belongs to the region nearer to the wall's normal."""
     if not 0 <= robot_angle_deg <= 180:
         return OUTSIDE
-    for name, (low, high) in REGIONS.items():
-        if low <= robot_angle_deg < high or (low >= 120 and low < robot_angle_deg <= high):
-            return name
-    return "green"
+    beyond_normal = robot_angle_deg > 90
+    return next(
+        name
+        for name, (_, high) in REGIONS.items()
+        if robot_angle_deg < high or (beyond_normal and robot_angle_deg == high)
+    )
 
 
 def polar(x_m: float, y_m: float) -> tuple[float, float]:

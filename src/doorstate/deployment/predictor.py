@@ -97,7 +97,9 @@ def packaged_weights(network: str) -> Path:
     path = _packaged(network)
     if not path.is_file():
         known = ", ".join(packaged_networks()) or "none"
-        raise WeightsError(f"no weights for {network!r} in the package (there are: {known}); give --weights FILE")
+        raise WeightsError(
+            f"no weights for {network!r} in the package (there are: {known}); give --weights FILE"
+        )
     return path
 
 

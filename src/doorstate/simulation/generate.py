@@ -62,7 +62,7 @@ class SampleRow(BaseModel):
     Poses are in the door frame (simulation.scene) but for `door_*`, which is the door frame in the sensor frame.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     sample_id: str
     pose_id: str

@@ -47,7 +47,9 @@ def unflatten(columns: Mapping[str, str]) -> SampleRow:
     except ValidationError as error:
         problem = error.errors()[0]
         column = ".".join(str(step) for step in problem["loc"])
-        raise DatasetError(f"manifest line {columns.get('sample_id', '?')}, column {column}: {problem['msg']}") from error
+        raise DatasetError(
+            f"manifest line {columns.get('sample_id', '?')}, column {column}: {problem['msg']}"
+        ) from error
 
 
 def write_csv(path: Path, rows: Sequence[Mapping[str, str]]) -> None:

@@ -64,8 +64,9 @@ def simulate_dataset(
         ConfigError: the folder holds something else.
     """
     _claim(folder, settings)
-    manifest = folder / MANIFEST
+    manifest, scratch = folder / MANIFEST, folder / "pieces"
     if manifest.exists():
+        shutil.rmtree(scratch, ignore_errors=True)
         progress(1, 1)
         return read_csv(manifest)
     indices = pose_indices(settings.poses)
@@ -73,7 +74,6 @@ def simulate_dataset(
         _Piece(settings, indices[start : start + _POSES_PER_PIECE], folder)
         for start in range(0, len(indices), _POSES_PER_PIECE)
     ]
-    scratch = folder / "pieces"
     paths = piece_paths(scratch, len(pieces), ".csv")
     run_pieces(_simulate_piece, pieces, paths, workers or default_workers(), progress)
     rows = [row for path in paths for row in read_csv(path)]

@@ -77,10 +77,7 @@ def _wall(door: Door) -> list[Box]:
     side = (length, door.wall_thickness_m, door.wall_height_m)
     lintel = (2 * inner, door.wall_thickness_m, door.wall_height_m - top)
     return [
-        *(
-            Box(Part.WALL, (sign * (inner + length / 2), y, door.wall_height_m / 2), side)
-            for sign in (1, -1)
-        ),
+        *(Box(Part.WALL, (sign * (inner + length / 2), y, door.wall_height_m / 2), side) for sign in (1, -1)),
         Box(Part.WALL, (0.0, y, (top + door.wall_height_m) / 2), lintel),
     ]
 

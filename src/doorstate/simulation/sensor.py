@@ -42,7 +42,10 @@ class DepthCamera(BaseModel):
         return Intrinsics.from_hfov(self.width, self.height, math.radians(self.hfov_deg))
 
 
-CAMERAS = {"xtion-gazebo": DepthCamera(), "xtion-hw": DepthCamera(hfov_deg=58.0, min_depth_m=0.8, max_depth_m=3.5)}
+CAMERAS = {
+    "xtion-gazebo": DepthCamera(),
+    "xtion-hw": DepthCamera(hfov_deg=58.0, min_depth_m=0.8, max_depth_m=3.5),
+}
 
 
 class CameraPose(NamedTuple):

@@ -40,4 +40,5 @@ def shade(rendered: Render, intrinsics: Intrinsics) -> NDArray[np.uint8]:
     light = 0.45 + 0.55 * np.abs(normal @ _LAMP) / np.linalg.norm(_LAMP)
     nothing = rendered.part == Part.NONE
     light[nothing] = 1.0
-    return np.clip(_PALETTE[rendered.part] * light[..., None], 0, 255).astype(np.uint8)
+    shaded: NDArray[np.uint8] = np.clip(_PALETTE[rendered.part] * light[..., None], 0, 255).astype(np.uint8)
+    return shaded

@@ -140,7 +140,9 @@ def prepare_comparison(experiment: Experiment, folder: Path) -> None:
         found = read_json(path)
         changed = sorted(key for key in {*found, *settings} if found.get(key) != settings.get(key))
         if changed:
-            raise RunError(f"{folder}: holds a comparison with another {', '.join(changed)}; choose another folder")
+            raise RunError(
+                f"{folder}: holds a comparison with another {', '.join(changed)}; choose another folder"
+            )
     dataset = open_dataset(Path(experiment.dataset))
     splits_path = folder / "splits.csv"
     if not splits_path.is_file():

@@ -30,7 +30,7 @@ from doorstate.files import atomic_path
 from doorstate.networks import create_network
 from doorstate.networks.base import PointNetwork
 from doorstate.networks.layers import set_batchnorm
-from doorstate.training.environment import bf16_is_quick, describe_environment
+from doorstate.training.environment import bf16_is_quick, describe_environment, keep_freed_memory
 from doorstate.training.recipes import Recipe, batchnorm_momentum, learning_rate, points_of_epoch
 from doorstate.training.run_folder import RunFolder
 from doorstate.training.weights import WeightsCard, load_into, save_weights
@@ -65,7 +65,13 @@ class Evaluation(NamedTuple):
     @property
     def macro_f1(self) -> float:
         return float(
-            f1_score(self.labels, self.probabilities.argmax(1), labels=range(len(STATES)), average="macro", zero_division=0)
+            f1_score(
+                self.labels,
+                self.probabilities.argmax(1),
+                labels=range(len(STATES)),
+                average="macro",
+                zero_division=0,
+            )
         )
 
     @property
@@ -73,7 +79,9 @@ class Evaluation(NamedTuple):
         return float(accuracy_score(self.labels, self.probabilities.argmax(1)))
 
 
-def fit(config: RunConfig, dataset: PreparedDataset, roles: Mapping[str, Role], folder: Path) -> dict[str, Any]:
+def fit(
+    config: RunConfig, dataset: PreparedDataset, roles: Mapping[str, Role], folder: Path
+) -> dict[str, Any]:
     """Train, choose the epoch on the validation samples, read the test samples once.
 
     Args:
@@ -94,6 +102,7 @@ def fit(config: RunConfig, dataset: PreparedDataset, roles: Mapping[str, Role], 
     if run.finished:
         return run.read_metrics()
     samples = _samples(roles)
+    keep_freed_memory()
     fabric = lightning_fabric.Fabric(accelerator="auto", devices=1, precision=_precision(config.recipe))
     with torch.random.fork_rng():
         torch.manual_seed(_seed(config, 0))
@@ -173,9 +182,7 @@ class _Trainer:
         load_into(self.network, self.run.weights)
         self.network.to(self.fabric.device)
         tested = self.samples["test"]
-        found = evaluate(
-            self.network, CloudLoader(self.dataset, tested, self.config.num_points), self.fabric
-        )
+        found = evaluate(self.network, CloudLoader(self.dataset, tested, self.config.num_points), self.fabric)
         self.run.write_predictions(tested, found.labels, found.probabilities)
         return {
             "network": self.config.network,
@@ -208,7 +215,9 @@ class _Trainer:
             if time.perf_counter() - told > _TELL_EVERY_S:
                 told = time.perf_counter()
                 self.run.write_position(iteration / per_epoch)
-            losses.append(self._step(self.fabric.to_device(batch.points), self.fabric.to_device(batch.labels)))
+            losses.append(
+                self._step(self.fabric.to_device(batch.points), self.fabric.to_device(batch.labels))
+            )
         mean = float(np.mean(losses))
         if not math.isfinite(mean):
             raise RunError(f"{self.run.path}: the loss is {mean} in epoch {epoch}; try a lower learning rate")
@@ -242,7 +251,9 @@ class _Trainer:
         try:
             state = torch.load(self.run.checkpoint, map_location=self.fabric.device, weights_only=True)
         except Exception as error:  # torch raises many kinds for a damaged file
-            raise RunError(f"{self.run.checkpoint}: cannot be read ({error}); delete the run's folder") from error
+            raise RunError(
+                f"{self.run.checkpoint}: cannot be read ({error}); delete the run's folder"
+            ) from error
         self.network.load_state_dict(state["network"])
         self.optimizer.load_state_dict(state["optimizer"])
         self.log, self.best_epoch = state["log"], state["best_epoch"]
@@ -292,7 +303,9 @@ def _samples(roles: Mapping[str, Role]) -> dict[str, list[str]]:
         samples[role].append(sample)
     for role in ("train", "val", "test"):
         if len(samples[role]) < 2:
-            raise DatasetError(f"only {len(samples[role])} samples for {role}: the data set is too small for this split")
+            raise DatasetError(
+                f"only {len(samples[role])} samples for {role}: the data set is too small for this split"
+            )
     return samples
 
 

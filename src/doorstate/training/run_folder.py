@@ -44,7 +44,9 @@ class RunFolder:
             found = read_json(self.config)
             if found != config:
                 changed = sorted(key for key in {*found, *config} if found.get(key) != config.get(key))
-                raise RunError(f"{self.path}: holds a run with another {', '.join(changed)}; choose another folder")
+                raise RunError(
+                    f"{self.path}: holds a run with another {', '.join(changed)}; choose another folder"
+                )
         else:
             write_json(self.config, config)
         if not self.finished:
@@ -74,7 +76,9 @@ class RunFolder:
         lines = read_csv(self.log) if self.log.is_file() else []
         return float(lines[-1]["seconds"]) if lines else 0.0
 
-    def write_predictions(self, samples: Sequence[str], labels: np.ndarray, probabilities: np.ndarray) -> None:
+    def write_predictions(
+        self, samples: Sequence[str], labels: np.ndarray, probabilities: np.ndarray
+    ) -> None:
         """Write the test samples' states and probabilities (M, 3)."""
         write_csv(
             self.predictions,

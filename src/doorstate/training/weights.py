@@ -59,7 +59,9 @@ def read_card(path: Path) -> WeightsCard:
     except (OSError, SafetensorError) as error:
         raise WeightsError(f"{path}: cannot be read as safetensors ({error})") from error
     except (KeyError, ValidationError, json.JSONDecodeError) as error:
-        raise WeightsError(f"{path}: does not say which network it is for: no weights of doorstate") from error
+        raise WeightsError(
+            f"{path}: does not say which network it is for: no weights of doorstate"
+        ) from error
 
 
 def load_weights(path: Path) -> tuple[PointNetwork, WeightsCard]:
@@ -75,7 +77,9 @@ def load_weights(path: Path) -> tuple[PointNetwork, WeightsCard]:
         network = create_network(card.network, len(card.states), **card.network_options)
         load_into(network, path)
     except RuntimeError as error:
-        raise WeightsError(f"{path}: does not fit network {card.network}: {str(error).splitlines()[0]}") from error
+        raise WeightsError(
+            f"{path}: does not fit network {card.network}: {str(error).splitlines()[0]}"
+        ) from error
     return network.eval(), card
 
 
@@ -84,5 +88,8 @@ def load_into(network: PointNetwork, path: Path) -> None:
     with safe_open(path, framework="pt") as weights:
         state = {name: weights.get_tensor(name) for name in weights.keys()}  # noqa: SIM118 - not a dict
     network.load_state_dict(
-        {name: tensor.to(torch.float32) if tensor.is_floating_point() else tensor for name, tensor in state.items()}
+        {
+            name: tensor.to(torch.float32) if tensor.is_floating_point() else tensor
+            for name, tensor in state.items()
+        }
     )

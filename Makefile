@@ -1,0 +1,32 @@
+# make setup: everything into .venv; make demo: the whole pipeline, small; make check, make test: before you commit.
+VENV := .venv
+BIN := $(VENV)/bin
+DEMO := demo
+
+.PHONY: setup check test demo lock clean
+
+setup: $(VENV)/.complete
+
+$(VENV)/.complete: tools/setup.sh requirements.lock pyproject.toml
+	bash tools/setup.sh $(VENV)
+	touch $@
+
+check: setup
+	$(BIN)/ruff check src tests tools
+	$(BIN)/ruff format --check src tests tools
+	$(BIN)/mypy
+	$(BIN)/python tools/check_imports.py
+
+test: setup check
+	$(BIN)/python -m pytest
+
+demo: setup
+	$(BIN)/python tools/demo.py $(DEMO)
+
+# Resolve anew what setup installs; torch stays pinned, since a free torch brings gigabytes of CUDA.
+lock:
+	bash tools/lock.sh $(VENV) > requirements.lock.new
+	mv requirements.lock.new requirements.lock
+
+clean:
+	rm -rf $(VENV) $(DEMO) build dist

@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Figures for paper and report, drawn without global state; the same inputs give the same bytes."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import NamedTuple
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import LogLocator, NullLocator
+
+from doorstate.dataset.store import PreparedDataset
+from doorstate.evaluation.metrics import ratio, scores
+from doorstate.evaluation.plan_figures import error_map, poses_figure
+from doorstate.evaluation.results import ComparisonResults, Run
+from doorstate.evaluation.samples_figure import samples_figure
+from doorstate.evaluation.score_tables import f1_intervals, fold_f1, pooled_confusion
+from doorstate.files import atomic_path
+from doorstate.types import STATES
+
+_DPI = 160
+_TRAINING, _VALIDATION, _INK = "#0072B2", "#D55E00", "#333333"
+
+
+class Drawing(NamedTuple):
+    """One figure as the bytes of two files."""
+
+    png: bytes
+    svg: bytes
+
+
+def draw_figures(results: ComparisonResults, dataset: PreparedDataset) -> dict[str, Drawing]:
+    """Draw every figure that the data allow, by the name of its files.
+
+    Args:
+        results: a checked comparison.
+        dataset: the prepared data set that it was trained on.
+    """
+    figures = {
+        "figure1_poses": poses_figure(dataset),
+        "figure2_samples": samples_figure(dataset),
+        "confusion": confusion_figure(results),
+        "spread": spread_figure(results, dataset),
+        "learning_curves": learning_figure(results),
+        "errors_in_plan": error_map(results, dataset),
+    }
+    return {name: _encode(figure) for name, figure in figures.items() if figure is not None}
+
+
+def write_figures(results: ComparisonResults, dataset: PreparedDataset, folder: Path) -> dict[str, Drawing]:
+    """Write `<name>.png` and `<name>.svg` of every figure; the same inputs give the same bytes.
+
+    Args:
+        results: a checked comparison.
+        dataset: the prepared data set that it was trained on.
+        folder: where the files go; made if absent.
+    """
+    drawings = draw_figures(results, dataset)
+    for name, drawing in drawings.items():
+        for ending, content in drawing._asdict().items():
+            with atomic_path(folder / f"{name}.{ending}") as temporary:
+                temporary.write_bytes(content)
+    return drawings
+
+
+def _encode(figure: Figure) -> Drawing:
+    png, svg = io.BytesIO(), io.BytesIO()
+    # Without salt and with a date, element names and metadata would differ from run to run.
+    with mpl.rc_context({"svg.hashsalt": "doorstate"}):
+        figure.savefig(png, format="png", dpi=_DPI, metadata={"Software": None})
+        figure.savefig(svg, format="svg", dpi=_DPI, metadata={"Date": None, "Creator": None})
+    return Drawing(png.getvalue(), svg.getvalue())
+
+
+def confusion_figure(results: ComparisonResults) -> Figure:
+    """Pooled confusion matrices side by side: counts, shaded by the share of the true state."""
+    networks = results.networks
+    figure = Figure(figsize=(2.5 * len(networks) + 0.6, 3.2), layout="compressed")
+    axes = figure.subplots(1, len(networks), squeeze=False, sharey=True)[0]
+    for axis, network in zip(axes, networks, strict=True):
+        counts = pooled_confusion(results, network)
+        share = np.nan_to_num(ratio(counts, counts.sum(axis=1, keepdims=True)))
+        axis.imshow(share, cmap="Blues", vmin=0.0, vmax=1.0)
+        for (i, j), count in np.ndenumerate(counts):
+            axis.text(
+                j, i, str(count), ha="center", va="center", color="white" if share[i, j] > 0.5 else "black"
+            )
+        axis.set(title=network, xlabel="predicted", xticks=range(len(STATES)), yticks=range(len(STATES)))
+        axis.set_xticklabels(STATES, fontsize=8)
+        axis.set_yticklabels(STATES, fontsize=8)
+    axes[0].set_ylabel("true")
+    return figure
+
+
+def spread_figure(results: ComparisonResults, dataset: PreparedDataset) -> Figure:
+    """Macro-F1 of each network: pooled with its 95 % interval, and each fold."""
+    networks = results.networks
+    figure = Figure(figsize=(7.0, 0.45 * len(networks) + 1.0), layout="constrained")
+    axis = figure.subplots()
+    for line, network in enumerate(networks):
+        folds = fold_f1(results, network)
+        pooled = float(scores(pooled_confusion(results, network)).macro.f1)
+        low, high = f1_intervals(results, dataset, network).macro
+        axis.plot([low, high], [line, line], color=_TRAINING, linewidth=5, alpha=0.35, solid_capstyle="butt")
+        axis.plot(folds, np.full(len(folds), line), "o", markersize=4.5, markerfacecolor="none", color=_INK)
+        axis.plot(pooled, line, "D", color=_TRAINING, markersize=6)
+    axis.set(xlabel="macro F1", yticks=range(len(networks)), ylim=(len(networks) - 0.5, -0.5))
+    axis.set_yticklabels(networks)
+    axis.grid(axis="x", alpha=0.25)
+    axis.spines[["top", "right"]].set_visible(False)
+    handles = [
+        Line2D([], [], marker="D", linestyle="", color=_TRAINING),
+        Line2D([], [], color=_TRAINING, linewidth=5, alpha=0.35),
+        Line2D([], [], marker="o", linestyle="", markerfacecolor="none", color=_INK),
+    ]
+    figure.legend(
+        handles, ["pooled", "95 % interval", "one fold"], loc="outside upper right", ncols=3, frameon=False
+    )
+    return figure
+
+
+def learning_figure(results: ComparisonResults) -> Figure:
+    """Losses and validation macro-F1 by epoch, a line for each fold, a dot at the epoch that was kept."""
+    networks = results.networks
+    figure = Figure(figsize=(2.6 * len(networks) + 0.8, 4.4), layout="constrained")
+    grid = figure.subplots(2, len(networks), squeeze=False, sharex="col", sharey="row")
+    for column, network in enumerate(networks):
+        losses, f1 = grid[0, column], grid[1, column]
+        for run in results.runs_of(network):
+            _draw_log(losses, run, "train_loss", _TRAINING)
+            _draw_log(losses, run, "val_loss", _VALIDATION)
+            _draw_log(f1, run, "val_macro_f1", _VALIDATION)
+        losses.set(title=network, yscale="log")
+        losses.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        losses.yaxis.set_major_formatter("{x:g}")
+        losses.yaxis.set_minor_locator(NullLocator())
+        f1.set(xlabel="epoch")
+        for axis in (losses, f1):
+            axis.grid(alpha=0.25)
+            if not axis.lines:
+                axis.text(
+                    0.5, 0.5, "no log", transform=axis.transAxes, ha="center", va="center", color="gray"
+                )
+    grid[0, 0].set_ylabel("loss")
+    grid[1, 0].set_ylabel("validation macro F1")
+    handles = [Line2D([], [], color=color) for color in (_TRAINING, _VALIDATION)]
+    figure.legend(handles, ["training", "validation"], loc="outside upper right", ncols=2, frameon=False)
+    return figure
+
+
+def _draw_log(axis: Axes, run: Run, column: str, color: str) -> None:
+    if column not in run.log:
+        return
+    epochs, values = run.log["epoch"], run.log[column]
+    axis.plot(epochs, values, color=color, alpha=0.7, linewidth=1.0)
+    kept = epochs == run.metric("best_epoch")
+    axis.plot(epochs[kept], values[kept], "o", color=color, markersize=3.5)

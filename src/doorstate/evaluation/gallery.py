@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Misclassified samples as the report shows them: cards with picture, cloud, facts and wrong answers."""
+
+from __future__ import annotations
+
+import base64
+import io
+from collections import Counter, defaultdict
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from doorstate.dataset.store import PreparedDataset
+from doorstate.evaluation.results import ComparisonResults, ErrorRow
+from doorstate.evaluation.stratum_tables import is_undecidable
+from doorstate.types import Points
+
+CARDS_PER_NETWORK = 24
+_SHOWN_POINTS = 2048
+_PICTURE_PX = (400, 300)
+
+
+@dataclass(frozen=True)
+class Card:
+    """One sample that at least one network misclassified."""
+
+    sample_id: str
+    state: str
+    undecidable: bool
+    facts: tuple[str, ...]
+    picture: str | None  # data URI
+    answers: tuple[ErrorRow, ...]
+
+
+@dataclass(frozen=True)
+class Gallery:
+    """Cards, the clouds they show (encoded for the page), and how many errors of a network are left out."""
+
+    cards: tuple[Card, ...]
+    clouds: Mapping[str, Mapping[str, str | None]]
+    left_out: Mapping[str, int]
+
+
+def build_gallery(results: ComparisonResults, dataset: PreparedDataset) -> Gallery:
+    """Choose the errors to show: of each network the decidable ones it was surest of, a card for each sample.
+
+    Args:
+        results: a checked comparison.
+        dataset: the prepared data set that it was trained on.
+    """
+    rows = {e.sample_id: dataset.rows[dataset.index_of(e.sample_id)] for e in results.error_rows}
+    by_network: dict[str, list[ErrorRow]] = defaultdict(list)
+    by_sample: dict[str, list[ErrorRow]] = defaultdict(list)
+    for error in results.error_rows:
+        by_network[error.network].append(error)
+        by_sample[error.sample_id].append(error)
+    chosen: set[str] = set()
+    for errors in by_network.values():
+        errors.sort(
+            key=lambda error: (is_undecidable(rows[error.sample_id]), -error.confidence, error.sample_id)
+        )
+        chosen |= {error.sample_id for error in errors[:CARDS_PER_NETWORK]}
+    order = sorted(chosen, key=lambda name: (is_undecidable(rows[name]), -len(by_sample[name]), name))
+    left_out = Counter(error.network for error in results.error_rows if error.sample_id not in chosen)
+    return Gallery(
+        cards=tuple(_card(dataset, rows[name], tuple(by_sample[name])) for name in order),
+        clouds={name: _encode_cloud(dataset, dataset.index_of(name)) for name in order},
+        left_out={network: left_out[network] for network in results.networks},
+    )
+
+
+def _card(dataset: PreparedDataset, row: Mapping[str, str], answers: tuple[ErrorRow, ...]) -> Card:
+    picture = dataset.image(dataset.index_of(row["sample_id"]))
+    return Card(
+        row["sample_id"],
+        row["state"],
+        is_undecidable(row),
+        tuple(_facts(row)),
+        None if picture is None else _picture_uri(picture),
+        answers,
+    )
+
+
+def _facts(row: Mapping[str, str]) -> list[str]:
+    """Say what the manifest knows; columns it lacks are passed over."""
+    facts = []
+    if angle := row.get("opening_angle_deg"):
+        facts.append(f"opened {float(angle):.0f}°")
+    if distance := row.get("distance_m"):
+        band = f" (band {row['distance_band']} m)" if row.get("distance_band") else ""
+        facts.append(f"{float(distance):.2f} m away{band}")
+    if bearing := row.get("robot_angle_deg"):
+        facts.append(f"seen from {float(bearing):.0f}° ({row.get('region') or 'no region'})")
+    if leaf := row.get("visible_leaf_px"):
+        facts.append(f"{leaf} leaf pixels")
+    if twin := row.get("same_image_as"):
+        facts.append(f"same image as {twin.replace(' ', ', ')}")
+    return facts
+
+
+def _picture_uri(picture: NDArray[np.uint8]) -> str:
+    image = Image.fromarray(picture)
+    image.thumbnail(_PICTURE_PX)
+    encoded = io.BytesIO()
+    image.save(encoded, format="JPEG", quality=85)
+    return data_uri(encoded.getvalue(), "image/jpeg")
+
+
+def _encode_cloud(dataset: PreparedDataset, index: int) -> dict[str, str | None]:
+    points, parts = dataset.cloud(index)[:_SHOWN_POINTS], dataset.parts(index)
+    return {
+        "points": _base64(_millimetres(points).tobytes()),
+        "parts": None if parts is None else _base64(parts[:_SHOWN_POINTS].tobytes()),
+    }
+
+
+def _millimetres(points: Points) -> NDArray[np.int16]:
+    """Round to the three decimals a viewer needs; a point beyond 32 m is drawn at 32 m."""
+    limit = np.iinfo(np.int16)
+    return np.asarray(np.clip(np.rint(points * 1000.0), limit.min, limit.max), dtype="<i2")
+
+
+def data_uri(content: bytes, media_type: str) -> str:
+    """Put a file into an address, so that the page needs no other file."""
+    return f"data:{media_type};base64,{_base64(content)}"
+
+
+def _base64(content: bytes) -> str:
+    return base64.b64encode(content).decode("ascii")

@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is counted: confusion matrices, their ratios, intervals around them, a paired test between networks.
+
+A ratio whose denominator is zero is undefined, hence NaN, never a silent zero. Labels: `DoorState` values.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.stats import binomtest
+from sklearn import metrics as sklearn_metrics
+
+from doorstate.types import STATES, Indices
+
+Floats = NDArray[np.float64]
+Interval = tuple[float, float]
+
+CONFIDENCE = 0.95
+
+
+def confusion_matrix(true: Indices, predicted: Indices) -> Indices:
+    """Count samples by true state (rows) and predicted state (columns).
+
+    Args:
+        true: (N,) labels, may be empty.
+        predicted: (N,) labels.
+
+    Returns:
+        (3, 3) counts in the order of `STATES`.
+    """
+    labels = np.arange(len(STATES))
+    if len(true) == 0:  # scikit-learn refuses an empty input
+        return np.zeros((len(labels), len(labels)), dtype=np.int64)
+    counts: Indices = sklearn_metrics.confusion_matrix(true, predicted, labels=labels)
+    return counts
+
+
+def ratio(numerator: ArrayLike, denominator: ArrayLike) -> Floats:
+    """Divide element by element; NaN where the denominator is zero."""
+    top, bottom = np.broadcast_arrays(np.asarray(numerator, float), np.asarray(denominator, float))
+    quotient: Floats = np.divide(top, bottom, out=np.full(top.shape, np.nan), where=bottom != 0)
+    return quotient
+
+
+@dataclass(frozen=True, eq=False)
+class Scores:
+    """Precision, recall and F1: arrays (..., 3) with one value a state, or (...) as means over them."""
+
+    precision: Floats
+    recall: Floats
+    f1: Floats
+
+    @property
+    def macro(self) -> Scores:
+        """Means over the states; NaN where a state is undefined."""
+        ratios = (self.precision, self.recall, self.f1)
+        return Scores(*(np.asarray(values.mean(axis=-1)) for values in ratios))
+
+
+def scores(confusion: NDArray[Any]) -> Scores:
+    """Compute precision, recall and F1 of each state.
+
+    recall = TP / (TP + FN), precision = TP / (TP + FP), F1 = 2 TP / (2 TP + FP + FN): the standard
+    definitions. The formulas printed in Kaleci & Turgut 2021 have the first two denominators swapped; the
+    words around them describe the standard ones.
+
+    Args:
+        confusion: (..., 3, 3) counts, rows true, columns predicted.
+    """
+    hits = np.diagonal(confusion, axis1=-2, axis2=-1)  # (..., 3)
+    true_count, predicted_count = confusion.sum(axis=-1), confusion.sum(axis=-2)
+    return Scores(
+        precision=ratio(hits, predicted_count),
+        recall=ratio(hits, true_count),
+        f1=ratio(2 * hits, true_count + predicted_count),
+    )
+
+
+def accuracy(confusion: NDArray[Any]) -> float:
+    """Share of samples on the diagonal of a (3, 3) confusion matrix."""
+    return float(ratio(np.trace(confusion), confusion.sum()))
+
+
+def wilson_interval(successes: int, trials: int) -> Interval:
+    """Give the 95 % Wilson score interval of a proportion; NaN where there were no trials (Wilson 1927)."""
+    if trials == 0:
+        return float("nan"), float("nan")
+    interval = binomtest(int(successes), int(trials)).proportion_ci(CONFIDENCE, method="wilson")
+    return float(interval.low), float(interval.high)
+
+
+@dataclass(frozen=True)
+class F1Intervals:
+    """Percentile bootstrap intervals of F1: one per state, and of their mean."""
+
+    per_state: tuple[Interval, ...]
+    macro: Interval
+
+
+def bootstrap_f1(
+    true: Indices,
+    predicted: Indices,
+    clusters: Sequence[str],
+    generator: np.random.Generator,
+    resamples: int = 2000,
+) -> F1Intervals:
+    """Bootstrap F1 by drawing whole clusters with replacement (percentile method, 95 %).
+
+    The three states of one pose share position and heading, so their outcomes depend on each other: a pose is
+    drawn as a whole. Clusters with the same confusion matrix are interchangeable, so one multinomial over the
+    few distinct matrices is the same distribution as drawing thousands of clusters one by one.
+
+    Args:
+        true: (N,) labels.
+        predicted: (N,) labels.
+        clusters: N names; samples of one name are drawn together.
+        generator: source of the draws.
+        resamples: number of bootstrap samples.
+    """
+    states = len(STATES)
+    if len(true) == 0:
+        undefined = (float("nan"), float("nan"))
+        return F1Intervals((undefined,) * states, undefined)
+    _, cluster = np.unique(np.asarray(clusters), return_inverse=True)
+    cells = np.zeros((cluster.max() + 1, states * states), dtype=np.int64)
+    np.add.at(cells, (cluster, true * states + predicted), 1)
+    patterns, counts = np.unique(cells, axis=0, return_counts=True)
+    draws = generator.multinomial(len(cells), counts / len(cells), size=resamples)
+    resampled = scores((draws @ patterns).reshape(resamples, states, states))  # (R, 3, 3)
+    return F1Intervals(
+        tuple(_percentile_interval(values) for values in resampled.f1.T),
+        _percentile_interval(resampled.macro.f1),
+    )
+
+
+def _percentile_interval(values: Floats) -> Interval:
+    defined = values[~np.isnan(values)]  # a resample without a state says nothing about that state's F1
+    if len(defined) == 0:
+        return float("nan"), float("nan")
+    low, high = np.quantile(defined, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
+    return float(low), float(high)
+
+
+@dataclass(frozen=True)
+class McNemar:
+    """Exact McNemar test: how often exactly one of two networks was right, and the two-sided p-value."""
+
+    only_first_right: int
+    only_second_right: int
+    p_value: float
+
+
+def mcnemar(first_right: NDArray[np.bool_], second_right: NDArray[np.bool_]) -> McNemar:
+    """Test whether two networks err equally often on the same N samples (McNemar 1947, exact binomial form).
+
+    Args:
+        first_right: (N,) whether the first network was right.
+        second_right: (N,) the same samples for the second.
+    """
+    only_first = int(np.count_nonzero(first_right & ~second_right))
+    only_second = int(np.count_nonzero(second_right & ~first_right))
+    discordant = only_first + only_second
+    p_value = float(binomtest(only_first, discordant).pvalue) if discordant else 1.0
+    return McNemar(only_first, only_second, p_value)
+
+
+def holm(p_values: Sequence[float]) -> list[float]:
+    """Adjust p-values for their number, in their own order (Holm 1979)."""
+    adjusted = [0.0] * len(p_values)
+    largest = 0.0
+    for rank, position in enumerate(np.argsort(p_values, kind="stable")):
+        largest = max(largest, min(1.0, (len(p_values) - rank) * p_values[position]))
+        adjusted[position] = largest
+    return adjusted
+
+
+def mean_and_deviation(values: Sequence[float]) -> Interval:
+    """Give mean and sample standard deviation (n - 1); NaN where there are too few values."""
+    mean = float(np.mean(values)) if len(values) else float("nan")
+    deviation = float(np.std(values, ddof=1)) if len(values) > 1 else float("nan")
+    return mean, deviation

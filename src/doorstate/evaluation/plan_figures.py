@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Plan views in the door frame: where the robot stood (the paper's Figure 1) and where networks erred."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Arc, Rectangle
+from numpy.typing import NDArray
+
+from doorstate.dataset.store import PreparedDataset
+from doorstate.dataset.strata import REGIONS
+from doorstate.evaluation.metrics import Floats
+from doorstate.evaluation.results import ComparisonResults
+from doorstate.evaluation.stratum_tables import is_undecidable
+from doorstate.evaluation.views import REGION_COLORS, STATE_COLORS
+from doorstate.simulation.scene import Door
+from doorstate.types import STATES
+
+_RINGS_M = (1.5, 2.0, 2.5, 3.0, 3.5)
+_INK, _FAINT = "#333333", "#BBBBBB"
+_POSE_COLUMNS = ("x_m", "y_m", "heading_deg", "region")
+_PLATE = {"facecolor": "white", "edgecolor": "none", "pad": 0.8}
+_MARKERS = {"closed": "s", "semi_open": "^", "open": "o"}
+
+
+def poses_figure(dataset: PreparedDataset) -> Figure | None:
+    """Figure 1: robot poses by region, distance rings, and the door; None for data without poses."""
+    rows = _posed_rows(dataset)
+    if not rows:
+        return None
+    poses = {(row["x_m"], row["y_m"], row["heading_deg"]): row for row in rows}
+    position = _positions(list(poses.values()))
+    heading_rad = np.radians([float(row["heading_deg"]) for row in poses.values()])
+    region = np.array([row["region"] for row in poses.values()])
+    figure = Figure(figsize=(9.0, 5.6), layout="constrained")
+    axis = figure.subplots()
+    _draw_ground(axis)
+    ahead = position + 0.07 * np.stack([np.cos(heading_rad), np.sin(heading_rad)], axis=1)
+    for name, color in REGION_COLORS.items():
+        inside = region == name
+        looks = np.stack([position[inside], ahead[inside]], axis=1)  # (n, 2, 2)
+        axis.add_collection(LineCollection(list(looks), colors=_INK, linewidths=0.4, alpha=0.7, zorder=3))
+        axis.scatter(
+            position[inside, 0],
+            position[inside, 1],
+            s=11,
+            color=color,
+            edgecolors=_INK,
+            linewidths=0.25,
+            zorder=4,
+        )
+        _label_region(axis, name, int(inside.sum()))
+    axis.spines[["top", "right"]].set_visible(False)
+    axis.set(xlabel="along the wall (m)", ylabel="away from the wall (m)")
+    axis.set_title(f"{len(poses)} robot poses; the tick points where the camera looks", fontsize=10)
+    return figure
+
+
+def error_map(results: ComparisonResults, dataset: PreparedDataset) -> Figure | None:
+    """Where each network's misclassified samples were taken; None without poses or without errors."""
+    if not _posed_rows(dataset) or not results.error_rows:
+        return None
+    networks = results.networks
+    columns = min(3, len(networks))
+    lines = math.ceil(len(networks) / columns)
+    figure = Figure(figsize=(4.2 * columns, 2.9 * lines + 0.4), layout="constrained")
+    axes = figure.subplots(lines, columns, squeeze=False).ravel()
+    everywhere = np.unique(_positions(_posed_rows(dataset)), axis=0)
+    for axis, network in zip(axes, networks, strict=False):
+        wrong = [
+            dataset.rows[dataset.index_of(e.sample_id)] for e in results.error_rows if e.network == network
+        ]
+        axis.scatter(*everywhere.T, s=2, color=_FAINT, linewidths=0, rasterized=True)
+        _draw_ground(axis, lettering=False)
+        for state in STATES:
+            for undecidable in (False, True):
+                chosen = [r for r in wrong if r["state"] == state and is_undecidable(r) == undecidable]
+                face = "none" if undecidable else STATE_COLORS[state]
+                edge = STATE_COLORS[state] if undecidable else _INK
+                points = _positions([row for row in chosen if row.get("x_m")])
+                axis.scatter(
+                    *points.T,
+                    s=26,
+                    marker=_MARKERS[state],
+                    facecolors=face,
+                    edgecolors=edge,
+                    linewidths=0.7,
+                    zorder=5,
+                )
+        axis.set_title(f"{network}: {len(wrong)} misclassified", fontsize=10)
+        axis.set_axis_off()
+    for axis in axes[len(networks) :]:
+        axis.set_axis_off()
+    handles = [
+        Line2D([], [], linestyle="", marker=_MARKERS[state], color=STATE_COLORS[state], markeredgecolor=_INK)
+        for state in STATES
+    ]
+    handles.append(Line2D([], [], linestyle="", marker="o", color="none", markeredgecolor=_INK))
+    labels = [*(f"{state} door" for state in STATES), "hollow: undecidable"]
+    figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False)
+    return figure
+
+
+def _posed_rows(dataset: PreparedDataset) -> list[dict[str, str]]:
+    return [row for row in dataset.rows if all(row.get(name) for name in _POSE_COLUMNS)]
+
+
+def _positions(rows: Sequence[dict[str, str]]) -> Floats:
+    """(N, 2) metres in the door frame."""
+    return np.array([(float(row["x_m"]), float(row["y_m"])) for row in rows], dtype=np.float64).reshape(-1, 2)
+
+
+def _draw_ground(axis: Axes, lettering: bool = True) -> None:
+    """Draw wall, opening, leaf, rings and region borders; the door is a sketch with the simulator's sizes."""
+    door = Door()
+    half, thick = door.opening_width_m / 2, door.wall_thickness_m
+    for left in (-3.9, half):
+        axis.add_patch(
+            Rectangle((left, -thick), 3.9 - half, thick, facecolor="#8C8C8C", edgecolor=_INK, linewidth=0.6)
+        )
+    hinge = np.array([half, -thick])
+    for angle_deg, style in ((0.0, ":"), (45.0, "-"), (90.0, ":")):
+        turn = math.radians(180.0 + angle_deg)
+        tip = hinge + door.opening_width_m * np.array([math.cos(turn), math.sin(turn)])
+        axis.plot(*np.stack([hinge, tip]).T, color="#7A4B1E", linewidth=2.0, linestyle=style)
+    reach = 2 * door.opening_width_m
+    axis.add_patch(Arc(tuple(hinge), reach, reach, theta1=180, theta2=270, color="#7A4B1E", linewidth=0.6))
+    bearing = np.linspace(0.0, math.pi, 181)
+    for radius in _RINGS_M:
+        axis.plot(radius * np.cos(bearing), radius * np.sin(bearing), color=_FAINT, linewidth=0.7, zorder=1)
+        if lettering:  # in the strip along the wall where no robot stands
+            axis.text(radius, 0.3, f"{radius:.1f} m", fontsize=7, ha="center", va="center", bbox=_PLATE)
+    for border_deg in sorted({edge for edges in REGIONS.values() for edge in edges} - {0, 180}):
+        ray = _ray(border_deg)
+        axis.plot(
+            *np.stack([_RINGS_M[0] * ray, _RINGS_M[-1] * ray]).T,
+            color=_INK,
+            linewidth=0.7,
+            linestyle="--",
+            zorder=2,
+        )
+    axis.set_aspect("equal")
+    axis.set(xlim=(-4.6, 4.6), ylim=(-1.2, 4.3))
+
+
+def _ray(angle_deg: float) -> NDArray[np.float64]:
+    angle_rad = math.radians(angle_deg)
+    return np.array([math.cos(angle_rad), math.sin(angle_rad)])
+
+
+def _label_region(axis: Axes, name: str, count: int) -> None:
+    low, high = REGIONS[name]
+    x, y = 3.68 * _ray((low + high) / 2)
+    side = "center" if name == "green" else "left" if x > 0 else "right"
+    text = f"{name}\n{low:g}–{high:g}°\n{count} poses"
+    axis.text(x, y, text, fontsize=8, ha=side, va="bottom" if name == "green" else "center")

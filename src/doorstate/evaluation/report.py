@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One HTML file that shows a comparison and loads nothing from anywhere."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from plotly.offline import get_plotlyjs
+
+from doorstate.dataset.store import PreparedDataset, open_dataset
+from doorstate.evaluation.figures import Drawing, draw_figures, write_figures
+from doorstate.evaluation.gallery import build_gallery, data_uri
+from doorstate.evaluation.metrics import ratio
+from doorstate.evaluation.notes import PROTOCOLS, honest_notes
+from doorstate.evaluation.results import ComparisonResults, load_results
+from doorstate.evaluation.score_tables import pooled_confusion
+from doorstate.evaluation.table import Table
+from doorstate.evaluation.tables import build_tables, write_tables
+from doorstate.evaluation.views import PART_COLORS, STATE_COLORS, VIEW_AZIMUTH_RAD, VIEW_ELEVATION_RAD
+from doorstate.files import write_text
+from doorstate.types import STATES, Part
+
+
+def write_report(comparison_folder: Path, out_html: Path) -> Path:
+    """Write the report of a comparison as one self-contained HTML file.
+
+    Args:
+        comparison_folder: finished or partly finished.
+        out_html: the file to write.
+
+    Raises:
+        RunError: the comparison cannot be used.
+        DatasetError: its data set or splits cannot be used.
+    """
+    results = load_results(comparison_folder)
+    dataset = open_dataset(results.dataset_folder)
+    tables, drawings = build_tables(results, dataset), draw_figures(results, dataset)
+    write_text(out_html, render_report(results, dataset, tables, drawings))
+    return out_html
+
+
+def write_everything(comparison_folder: Path, out_folder: Path) -> Path:
+    """Write `tables/`, `figures/` and `report.html`; the same inputs give the same bytes.
+
+    Args:
+        comparison_folder: finished or partly finished.
+        out_folder: made if absent.
+
+    Returns:
+        The report.
+
+    Raises:
+        RunError: the comparison cannot be used.
+        DatasetError: its data set or splits cannot be used.
+    """
+    results = load_results(comparison_folder)
+    dataset = open_dataset(results.dataset_folder)
+    tables = write_tables(results, dataset, out_folder / "tables")
+    drawings = write_figures(results, dataset, out_folder / "figures")
+    report = out_folder / "report.html"
+    write_text(report, render_report(results, dataset, tables, drawings))
+    return report
+
+
+def render_report(
+    results: ComparisonResults,
+    dataset: PreparedDataset,
+    tables: Mapping[str, Table],
+    drawings: Mapping[str, Drawing],
+) -> str:
+    """Fill the template.
+
+    Args:
+        results: a checked comparison.
+        dataset: the prepared data set that it was trained on.
+        tables: what `build_tables` gave.
+        drawings: what `draw_figures` gave.
+    """
+    environment = Environment(
+        loader=PackageLoader("doorstate.evaluation"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    gallery = build_gallery(results, dataset)
+    return environment.get_template("report.html.j2").render(
+        results=results,
+        comparison=results.comparison,
+        recipe=json.dumps(results.comparison.recipe, indent=2, default=str),
+        protocol=PROTOCOLS.get(results.comparison.protocol, ""),
+        notes=honest_notes(results, dataset),
+        facts=_facts(results, dataset),
+        environment=_environment(results),
+        tables=tables,
+        figures={name: _image_uri(drawing) for name, drawing in drawings.items()},
+        confusions=[(network, _confusion_cells(results, network)) for network in results.networks],
+        states=STATES,
+        state_colors=STATE_COLORS,
+        gallery=gallery,
+        page_data={
+            "clouds": gallery.clouds,
+            "parts": [
+                {"value": part, "name": part.name.lower(), "color": PART_COLORS[part]} for part in Part
+            ],
+            "view": {"azimuth": VIEW_AZIMUTH_RAD, "elevation": VIEW_ELEVATION_RAD},
+        },
+        # The library is kept as text until the first cloud is opened, so the page itself appears at once.
+        plotly=get_plotlyjs().replace("</script", r"<\/script"),
+    )
+
+
+def _image_uri(drawing: Drawing) -> str:
+    """Take whichever file of a figure is smaller."""
+    if len(drawing.svg) < len(drawing.png):
+        return data_uri(drawing.svg, "image/svg+xml")
+    return data_uri(drawing.png, "image/png")
+
+
+def _confusion_cells(results: ComparisonResults, network: str) -> list[list[tuple[int, float]]]:
+    """Counts with their share of the true state, row by row; a share of nothing is 0 here, it only tints."""
+    counts = pooled_confusion(results, network)
+    shares = np.nan_to_num(ratio(counts, counts.sum(axis=1, keepdims=True)))
+    return [list(zip(*pair, strict=True)) for pair in zip(counts.tolist(), shares.tolist(), strict=True)]
+
+
+def _facts(results: ComparisonResults, dataset: PreparedDataset) -> dict[str, str]:
+    comparison = results.comparison
+    states = [row["state"] for row in dataset.rows]
+    roles = [results.role_counts(fold) for fold in range(comparison.folds)]
+    return {
+        "Networks": ", ".join(comparison.networks),
+        "Runs": f"{len(results.runs)} of {len(results.runs) + len(results.missing)}",
+        "Data": f"{dataset.description.source} ({dataset.description.kind})",
+        "Samples": f"{len(states)}: " + ", ".join(f"{states.count(state)} {state}" for state in STATES),
+        "Points a cloud": str(comparison.num_points),
+        "Protocol": f"{comparison.protocol}, {comparison.folds} folds",
+        **{
+            name: _range(count[role] for count in roles)
+            for name, role in (
+                ("Training samples a fold", "train"),
+                ("Validation samples a fold", "val"),
+                ("Test samples a fold", "test"),
+                ("Unused samples a fold", "unused"),
+            )
+        },
+        "Seed": str(comparison.seed),
+    }
+
+
+def _range(values: Iterable[int]) -> str:
+    numbers = sorted(set(values))
+    return str(numbers[0]) if len(numbers) == 1 else f"{numbers[0]} to {numbers[-1]}"
+
+
+def _environment(results: ComparisonResults) -> dict[str, str]:
+    """Every value that the runs recorded, once; several where runs differ."""
+    values: dict[str, dict[str, None]] = {}
+    for run in results.runs:
+        for name, value in run.environment.items():
+            values.setdefault(name, {})[_text(value)] = None
+    return {name: "; ".join(found) for name, found in sorted(values.items())}
+
+
+def _text(value: Any) -> str:
+    return value if isinstance(value, str) else json.dumps(value, sort_keys=True)

@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Samples of each state and region, picture above and cloud below (the paper's Figure 2)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from numpy.typing import NDArray
+
+from doorstate.dataset.store import PreparedDataset
+from doorstate.dataset.strata import REGIONS
+from doorstate.evaluation.stratum_tables import has_strata, is_undecidable
+from doorstate.evaluation.views import PART_COLORS, REGION_COLORS, oblique_view, point_colors
+from doorstate.types import STATES, Part
+
+_MIDDLE_M = 2.25
+_SHOWN_POINTS = 2048
+
+
+def samples_figure(dataset: PreparedDataset) -> Figure:
+    """Figure 2: one sample of each state in each region, or one of each state where regions are unknown."""
+    regions: Sequence[str] = tuple(REGIONS) if has_strata(dataset) else ("",)
+    chosen = [[_typical_sample(dataset, state, region) for region in regions] for state in STATES]
+    indices = [index for line in chosen for index in line if index is not None]
+    pictures = {index: dataset.image(index) for index in indices}
+    lines_per_state = 2 if any(picture is not None for picture in pictures.values()) else 1
+    height = 1.75 * lines_per_state * len(STATES) + 0.4
+    figure = Figure(figsize=(2.3 * len(regions) + 0.4, height), layout="constrained")
+    axes = figure.subplots(lines_per_state * len(STATES), len(regions), squeeze=False)
+    for axis in axes.ravel():
+        axis.set(xticks=[], yticks=[])
+        axis.spines[:].set_visible(False)
+    for s, state in enumerate(STATES):
+        first = lines_per_state * s
+        axes[first, 0].set_ylabel(state, fontsize=11)
+        for column, index in enumerate(chosen[s]):
+            if index is None:
+                axes[first, column].text(0.5, 0.5, "no such sample", ha="center", va="center", color="gray")
+                continue
+            picture = pictures[index]
+            if picture is not None:
+                axes[first, column].imshow(picture[::2, ::2], interpolation="none")
+            _draw_cloud(axes[first + lines_per_state - 1, column], dataset, index)
+    for column, region in enumerate(regions):
+        if region:
+            low, high = REGIONS[region]
+            axes[0, column].set_title(f"{region} {low:g}–{high:g}°", fontsize=10)
+            axes[0, column].plot(
+                [0, 1],
+                [1.02, 1.02],
+                transform=axes[0, column].transAxes,
+                clip_on=False,
+                color=REGION_COLORS[region],
+                linewidth=3,
+            )
+    seen = {part for index in indices for part in np.unique(_shown_parts(dataset, index)).tolist()}
+    if seen:
+        handles = [
+            Line2D([], [], marker="o", linestyle="", color=PART_COLORS[Part(part)]) for part in sorted(seen)
+        ]
+        names = [Part(part).name.lower() for part in sorted(seen)]
+        figure.legend(handles, names, loc="outside lower center", ncols=len(seen), frameon=False)
+    return figure
+
+
+def _typical_sample(dataset: PreparedDataset, state: str, region: str) -> int | None:
+    """Index of a decidable sample near the middle of a region; without regions the first of the state."""
+    rows = [
+        (index, row)
+        for index, row in enumerate(dataset.rows)
+        if row["state"] == state and (not region or row.get("region") == region)
+    ]
+    if not rows:
+        return None
+    if not region:
+        return rows[0][0]
+    low, high = REGIONS[region]
+
+    def distance_from_typical(row: dict[str, str]) -> float:
+        off_angle = abs(float(row["robot_angle_deg"]) - (low + high) / 2) / (high - low)
+        return off_angle + abs(float(row["distance_m"]) - _MIDDLE_M)
+
+    return min(rows, key=lambda pair: (is_undecidable(pair[1]), distance_from_typical(pair[1])))[0]
+
+
+def _shown_parts(dataset: PreparedDataset, index: int) -> NDArray[np.uint8]:
+    """Parts of the shown points; empty where they are unknown."""
+    parts = dataset.parts(index)
+    return np.empty(0, np.uint8) if parts is None else parts[:_SHOWN_POINTS]
+
+
+def _draw_cloud(axis: Axes, dataset: PreparedDataset, index: int) -> None:
+    points, parts, row = (
+        dataset.cloud(index)[:_SHOWN_POINTS],
+        _shown_parts(dataset, index),
+        dataset.rows[index],
+    )
+    colors = point_colors(points, parts if len(parts) else None)
+    screen, order = oblique_view(points)
+    # Rasterised: thousands of vector markers would make the SVG slow to open.
+    axis.scatter(screen[order, 0], screen[order, 1], s=1.2, c=colors[order], linewidths=0, rasterized=True)
+    axis.set_aspect("equal")
+    angle, distance = row.get("opening_angle_deg"), row.get("distance_m")
+    facts = [
+        f"{float(angle):.0f}° open" if angle else "",
+        f"{float(distance):.1f} m away" if distance else "",
+    ]
+    axis.set_xlabel(", ".join(fact for fact in facts if fact), fontsize=8)

@@ -1,0 +1,136 @@
+"use strict";
+(() => {
+  const data = JSON.parse(document.getElementById("page-data").textContent);
+  const LIVE_AT_ONCE = 4; // browsers drop the oldest WebGL contexts at about eight
+  const part = Object.fromEntries(data.parts.map((p) => [p.value, p]));
+
+  // ---- network filters -------------------------------------------------------------------------------------
+  for (const group of document.querySelectorAll(".chips")) {
+    const target = document.getElementById(group.dataset.target);
+    const choose = (network) => {
+      for (const button of group.children) {
+        button.setAttribute("aria-pressed", String(button.dataset.choice === network));
+      }
+      for (const item of target.querySelectorAll("tr[data-network], .card, .answers li")) {
+        item.hidden = network !== "" && !item.dataset.network.split(" ").includes(network);
+      }
+      target.classList.toggle("single", network !== "");
+    };
+    group.addEventListener("click", (event) => {
+      const button = event.target.closest("button");
+      if (button) choose(button.dataset.choice);
+    });
+    if (group.dataset.target === "strata") choose(group.children[1].dataset.choice);
+  }
+
+  // ---- clouds ----------------------------------------------------------------------------------------------
+  const bytes = (text) => Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
+
+  function decode(sample) {
+    const { points, parts } = data.clouds[sample];
+    const raw = new DataView(bytes(points).buffer);
+    const count = raw.byteLength / 6;
+    const axis = (k) => Float32Array.from({ length: count }, (_, i) => raw.getInt16(6 * i + 2 * k, true) / 1000);
+    return { count, x: axis(0), y: axis(1), z: axis(2), parts: parts && bytes(parts) };
+  }
+
+  function groupsOf(cloud) {
+    const everything = Array.from({ length: cloud.count }, (_, i) => i);
+    if (!cloud.parts) return [{ name: "height", color: null, members: everything }];
+    return [...new Set(cloud.parts)].sort((a, b) => a - b).map((value) => ({
+      ...part[value], members: everything.filter((i) => cloud.parts[i] === value),
+    }));
+  }
+
+  function heightColors(z) {
+    let low = Infinity, high = -Infinity;
+    for (const value of z) { low = Math.min(low, value); high = Math.max(high, value); }
+    return Array.from(z, (value) => `hsl(${260 - (200 * (value - low)) / (high - low || 1)} 65% 50%)`);
+  }
+
+  // The same oblique view as Figure 2: from behind and above the camera, near points last.
+  function preview(canvas, cloud) {
+    const { azimuth: a, elevation: e } = data.view;
+    const forward = [Math.cos(e) * Math.cos(a), Math.cos(e) * Math.sin(a), -Math.sin(e)];
+    const right = [Math.sin(a), -Math.cos(a), 0];
+    const up = [Math.sin(e) * Math.cos(a), Math.sin(e) * Math.sin(a), Math.cos(e)];
+    const along = (d) => Float32Array.from(cloud.x, (x, i) => x * d[0] + cloud.y[i] * d[1] + cloud.z[i] * d[2]);
+    const [u, v, depth] = [along(right), along(up), along(forward)];
+    const colors = cloud.parts ? Array.from(cloud.parts, (value) => part[value].color) : heightColors(cloud.z);
+    const scale = window.devicePixelRatio || 1;
+    const [width, height] = [canvas.clientWidth * scale, canvas.clientHeight * scale];
+    [canvas.width, canvas.height] = [width, height];
+    const span = (values) => [Math.min(...values), Math.max(...values)];
+    const [[left, rightmost], [bottom, top]] = [span(u), span(v)];
+    const zoom = 0.92 * Math.min(width / (rightmost - left || 1), height / (top - bottom || 1));
+    const pen = canvas.getContext("2d");
+    const size = 1.5 * scale;
+    for (const i of Array.from(depth.keys()).sort((p, q) => depth[q] - depth[p])) {
+      pen.fillStyle = colors[i];
+      pen.fillRect(
+        width / 2 + zoom * (u[i] - (left + rightmost) / 2), height / 2 - zoom * (v[i] - (bottom + top) / 2), size, size,
+      );
+    }
+  }
+
+  const whenSeen = new IntersectionObserver((entries) => {
+    for (const entry of entries.filter((e) => e.isIntersecting && e.target.clientWidth)) {
+      whenSeen.unobserve(entry.target);
+      preview(entry.target, decode(entry.target.closest(".card").dataset.sample));
+    }
+  }, { rootMargin: "300px" });
+  document.querySelectorAll(".cloud canvas").forEach((canvas) => whenSeen.observe(canvas));
+
+  // ---- 3D, made when asked for -----------------------------------------------------------------------------
+  const live = [];
+
+  function needPlotly() {
+    if (window.Plotly) return;
+    const script = document.createElement("script");
+    script.textContent = document.getElementById("plotly").textContent;
+    document.head.append(script);
+  }
+
+  function close(plot) {
+    window.Plotly.purge(plot);
+    plot.previousElementSibling.hidden = false;
+    plot.remove();
+  }
+
+  function open(button) {
+    needPlotly();
+    const cloud = decode(button.closest(".card").dataset.sample);
+    const pick = (values, members) => members.map((i) => values[i]);
+    const traces = groupsOf(cloud).map(({ name, color, members }) => ({
+      type: "scatter3d", mode: "markers", name, hovertemplate: "x %{x:.2f}, y %{y:.2f}, z %{z:.2f} m",
+      x: pick(cloud.x, members), y: pick(cloud.y, members), z: pick(cloud.z, members),
+      marker: color ? { size: 2, color } : { size: 2, color: pick(cloud.z, members), colorscale: "Viridis" },
+    }));
+    traces.push({
+      type: "scatter3d", mode: "markers", name: "camera", hovertemplate: "camera",
+      x: [0], y: [0], z: [0], marker: { size: 5, symbol: "diamond", color: "#d62728" },
+    });
+    const plot = document.createElement("div");
+    plot.className = "live";
+    button.after(plot);
+    button.hidden = true;
+    const ink = getComputedStyle(document.body).color;
+    const axis = (title) => ({ title: { text: title }, color: ink, gridcolor: "rgba(128,128,128,.3)", backgroundcolor: "rgba(0,0,0,0)" });
+    const { azimuth: a, elevation: e } = data.view;
+    const eye = { x: -2 * Math.cos(e) * Math.cos(a), y: -2 * Math.cos(e) * Math.sin(a), z: 2 * Math.sin(e) };
+    window.Plotly.newPlot(plot, traces, {
+      margin: { l: 0, r: 0, t: 0, b: 0 }, paper_bgcolor: "rgba(0,0,0,0)", font: { color: ink },
+      modebar: { bgcolor: "rgba(0,0,0,0)", color: ink },
+      legend: { orientation: "h", itemsizing: "constant", y: 0.02 },
+      scene: { aspectmode: "data", camera: { eye }, xaxis: axis("forward (m)"), yaxis: axis("left (m)"), zaxis: axis("up (m)") },
+    }, { displaylogo: false, responsive: true }).then(() => {
+      live.push(plot);
+      if (live.length > LIVE_AT_ONCE) close(live.shift());
+    });
+  }
+
+  document.addEventListener("click", (event) => {
+    const button = event.target.closest(".cloud");
+    if (button) open(button);
+  });
+})();

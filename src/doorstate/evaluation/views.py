@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How clouds, states and regions look in every picture: colours and one oblique view."""
+
+from __future__ import annotations
+
+import math
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.colors import Normalize, to_rgba_array
+from numpy.typing import NDArray
+
+from doorstate.types import Part, Points
+
+# Okabe & Ito's colour-blind-safe set, with a deeper red so that the paper's region names fit what is seen.
+REGION_COLORS = {
+    "orange": "#E69F00",
+    "red": "#B3202C",
+    "green": "#009E73",
+    "yellow": "#F0E442",
+    "blue": "#0072B2",
+}
+STATE_COLORS = {"closed": "#0072B2", "semi_open": "#E69F00", "open": "#CC79A7"}
+PART_COLORS = {
+    Part.WALL: "#A9B1BC",
+    Part.FRAME: "#7B4FA3",
+    Part.LEAF: "#D55E00",
+    Part.FLOOR: "#6C8EAD",
+    Part.CEILING: "#C9CED6",
+    Part.OTHER: "#009E73",
+    Part.NONE: "#333333",
+}
+
+VIEW_AZIMUTH_RAD = math.radians(-24.0)  # the eye stands to the left of the robot ...
+VIEW_ELEVATION_RAD = math.radians(28.0)  # ... and above it
+
+
+def oblique_view(points: Points) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Look at a cloud from behind and above the sensor, without perspective.
+
+    Args:
+        points: (N, 3) metres, sensor frame.
+
+    Returns:
+        (N, 2) metres to the right and up, and the (N,) order in which near points are drawn last.
+    """
+    azimuth, elevation = VIEW_AZIMUTH_RAD, VIEW_ELEVATION_RAD
+    forward = np.array(
+        [
+            math.cos(elevation) * math.cos(azimuth),
+            math.cos(elevation) * math.sin(azimuth),
+            -math.sin(elevation),
+        ]
+    )
+    right = np.array([math.sin(azimuth), -math.cos(azimuth), 0.0])
+    screen = points.astype(np.float64) @ np.stack([right, np.cross(right, forward)], axis=1)  # (N, 2)
+    return screen, np.argsort(-(points @ forward), kind="stable")
+
+
+def point_colors(points: Points, parts: NDArray[np.uint8] | None) -> NDArray[np.float64]:
+    """Colour each point by its part, or by its height where parts are unknown.
+
+    Args:
+        points: (N, 3) metres.
+        parts: (N,) values of `Part`, or None.
+
+    Returns:
+        (N, 4) red, green, blue and opacity, 0 to 1.
+    """
+    if parts is None:
+        height = Normalize()(points[:, 2].astype(np.float64))
+        return np.asarray(mpl.colormaps["viridis"](height))
+    palette = to_rgba_array([PART_COLORS[Part(part)] for part in np.unique(parts)])
+    return np.asarray(palette[np.unique(parts, return_inverse=True)[1]])
