@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -42,14 +43,18 @@ def draw_figures(results: ComparisonResults, dataset: PreparedDataset) -> dict[s
         dataset: the prepared data set that it was trained on.
     """
     figures = {
-        "figure1_poses": poses_figure(dataset),
-        "figure2_samples": samples_figure(dataset),
+        **dataset_figures(dataset),
         "confusion": confusion_figure(results),
         "spread": spread_figure(results, dataset),
         "learning_curves": learning_figure(results),
         "errors_in_plan": error_map(results, dataset),
     }
-    return {name: _encode(figure) for name, figure in figures.items() if figure is not None}
+    return encode_figures(figures)
+
+
+def dataset_figures(dataset: PreparedDataset) -> dict[str, Figure | None]:
+    """Draw Figures 1 and 2, which need no results; None where the data set has no poses."""
+    return {"figure1_poses": poses_figure(dataset), "figure2_samples": samples_figure(dataset)}
 
 
 def write_figures(results: ComparisonResults, dataset: PreparedDataset, folder: Path) -> dict[str, Drawing]:
@@ -61,11 +66,21 @@ def write_figures(results: ComparisonResults, dataset: PreparedDataset, folder: 
         folder: where the files go; made if absent.
     """
     drawings = draw_figures(results, dataset)
+    save_drawings(drawings, folder)
+    return drawings
+
+
+def save_drawings(drawings: Mapping[str, Drawing], folder: Path) -> None:
+    """Write `<name>.png` and `<name>.svg` of every figure."""
     for name, drawing in drawings.items():
         for ending, content in drawing._asdict().items():
             with atomic_path(folder / f"{name}.{ending}") as temporary:
                 temporary.write_bytes(content)
-    return drawings
+
+
+def encode_figures(figures: Mapping[str, Figure | None]) -> dict[str, Drawing]:
+    """Turn figures into files that are the same each time they are drawn; those that are None are left out."""
+    return {name: _encode(figure) for name, figure in figures.items() if figure is not None}
 
 
 def _encode(figure: Figure) -> Drawing:

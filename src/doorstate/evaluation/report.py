@@ -13,14 +13,21 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from plotly.offline import get_plotlyjs
 
 from doorstate.dataset.store import PreparedDataset, open_dataset
-from doorstate.evaluation.figures import Drawing, draw_figures, write_figures
+from doorstate.evaluation.figures import (
+    Drawing,
+    dataset_figures,
+    draw_figures,
+    encode_figures,
+    save_drawings,
+    write_figures,
+)
 from doorstate.evaluation.gallery import build_gallery, data_uri
 from doorstate.evaluation.metrics import ratio
 from doorstate.evaluation.notes import PROTOCOLS, honest_notes
 from doorstate.evaluation.results import ComparisonResults, load_results
 from doorstate.evaluation.score_tables import pooled_confusion
 from doorstate.evaluation.table import Table
-from doorstate.evaluation.tables import build_tables, write_tables
+from doorstate.evaluation.tables import build_tables, dataset_tables, save_tables, write_tables
 from doorstate.evaluation.views import PART_COLORS, STATE_COLORS, VIEW_AZIMUTH_RAD, VIEW_ELEVATION_RAD
 from doorstate.files import write_text
 from doorstate.types import STATES, Part
@@ -65,6 +72,25 @@ def write_everything(comparison_folder: Path, out_folder: Path) -> Path:
     report = out_folder / "report.html"
     write_text(report, render_report(results, dataset, tables, drawings))
     return report
+
+
+def write_dataset_figures(dataset_folder: Path, out_folder: Path) -> Path:
+    """Write what can be shown of a prepared data set alone: Table 1, undecidable frames, Figures 1 and 2.
+
+    Args:
+        dataset_folder: a prepared data set.
+        out_folder: made if absent; gets `tables/` and `figures/`.
+
+    Returns:
+        `out_folder`.
+
+    Raises:
+        DatasetError: the data set cannot be used.
+    """
+    dataset = open_dataset(dataset_folder)
+    save_tables(dataset_tables(dataset), out_folder / "tables")
+    save_drawings(encode_figures(dataset_figures(dataset)), out_folder / "figures")
+    return out_folder
 
 
 def render_report(

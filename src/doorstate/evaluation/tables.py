@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from doorstate.dataset.store import PreparedDataset
@@ -40,7 +41,7 @@ def build_tables(results: ComparisonResults, dataset: PreparedDataset) -> dict[s
     """
     return {
         "summary": summary_table(results, dataset),
-        "table1_samples": samples_table(dataset),
+        **dataset_tables(dataset),
         "table2_confusion": confusion_table(results),
         "table3_scores": scores_table(results, dataset),
         **{
@@ -49,11 +50,15 @@ def build_tables(results: ComparisonResults, dataset: PreparedDataset) -> dict[s
         },
         "folds": folds_table(results),
         "paired_tests": paired_table(results),
-        "undecidable_frames": undecidable_table(dataset),
         "undecidable_accuracy": decidable_table(results, dataset),
         "runs": runs_table(results),
         "misclassified": misclassified_table(results, dataset),
     }
+
+
+def dataset_tables(dataset: PreparedDataset) -> dict[str, Table]:
+    """Build the tables that need no results."""
+    return {"table1_samples": samples_table(dataset), "undecidable_frames": undecidable_table(dataset)}
 
 
 def write_tables(results: ComparisonResults, dataset: PreparedDataset, folder: Path) -> dict[str, Table]:
@@ -68,11 +73,16 @@ def write_tables(results: ComparisonResults, dataset: PreparedDataset, folder: P
         The tables by the name of their files.
     """
     tables = build_tables(results, dataset)
+    save_tables(tables, folder)
+    return tables
+
+
+def save_tables(tables: Mapping[str, Table], folder: Path) -> None:
+    """Write `<name>.md`, `<name>.tex` and `<name>.csv` of every table."""
     for name, table in tables.items():
         write_text(folder / f"{name}.md", table.to_markdown())
         write_text(folder / f"{name}.tex", table.to_latex())
         write_text(folder / f"{name}.csv", table.to_csv())
-    return tables
 
 
 def runs_table(results: ComparisonResults) -> Table:

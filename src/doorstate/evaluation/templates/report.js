@@ -45,7 +45,7 @@
   function heightColors(z) {
     let low = Infinity, high = -Infinity;
     for (const value of z) { low = Math.min(low, value); high = Math.max(high, value); }
-    return Array.from(z, (value) => `hsl(${260 - (200 * (value - low)) / (high - low || 1)} 65% 50%)`);
+    return Array.from(z, (value) => `hsl(${260 - (200 * (value - low)) / (high - low || 1)} 70% 42%)`);
   }
 
   // The same oblique view as Figure 2: from behind and above the camera, near points last.
@@ -64,7 +64,7 @@
     const [[left, rightmost], [bottom, top]] = [span(u), span(v)];
     const zoom = 0.92 * Math.min(width / (rightmost - left || 1), height / (top - bottom || 1));
     const pen = canvas.getContext("2d");
-    const size = 1.5 * scale;
+    const size = Math.max(1.5 * scale, width / 260);
     for (const i of Array.from(depth.keys()).sort((p, q) => depth[q] - depth[p])) {
       pen.fillStyle = colors[i];
       pen.fillRect(

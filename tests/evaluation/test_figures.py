@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Figures: which ones there are, what they show, and the same bytes each time."""
+
+from __future__ import annotations
+
+import io
+import xml.etree.ElementTree as ET
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.collections import PathCollection
+from PIL import Image
+
+from doorstate.dataset.store import PreparedDataset
+from doorstate.evaluation.figures import confusion_figure, learning_figure, spread_figure, write_figures
+from doorstate.evaluation.plan_figures import error_map, poses_figure
+from doorstate.evaluation.results import load_results
+from doorstate.evaluation.samples_figure import samples_figure
+from doorstate.types import STATES
+
+
+def test_imported_data_have_the_figures_that_need_no_pose(
+    imported: PreparedDataset, make_comparison: Callable[..., Path], tmp_path: Path
+) -> None:
+    results = load_results(make_comparison(imported, {"dgcnn": {"open/3": "closed"}}))
+    first = write_figures(results, imported, tmp_path / "figures")
+    assert set(first) == {"figure2_samples", "confusion", "spread", "learning_curves"}
+    expected = {f"{name}.{ending}" for name in first for ending in ("png", "svg")}
+    assert {path.name for path in (tmp_path / "figures").iterdir()} == expected
+    for name, drawing in first.items():
+        assert (tmp_path / "figures" / f"{name}.svg").read_bytes() == drawing.svg
+        assert b"<dc:date>" not in drawing.svg
+        assert ET.fromstring(drawing.svg).tag.endswith("svg")
+        picture = Image.open(io.BytesIO(drawing.png))
+        assert np.ptp(np.asarray(picture.convert("L"))) > 100
+    assert write_figures(results, imported, tmp_path / "again") == first
+
+
+def test_poses_figure_draws_each_pose_once(simulated: PreparedDataset, imported: PreparedDataset) -> None:
+    figure = poses_figure(simulated)
+    assert figure is not None
+    (axis,) = figure.axes
+    assert axis.get_aspect() == 1.0
+    dots = [c for c in axis.collections if isinstance(c, PathCollection)]
+    drawn = np.concatenate([np.asarray(c.get_offsets()) for c in dots])
+    expected = {(float(row["x_m"]), float(row["y_m"])) for row in simulated.rows}
+    assert {(x, y) for x, y in drawn.tolist()} == expected
+    assert len(drawn) == len(expected) == 40
+    assert "40 robot poses" in axis.get_title()
+    assert poses_figure(imported) is None
+
+
+def test_samples_figure_has_picture_and_cloud_of_each_state_and_region(simulated: PreparedDataset) -> None:
+    figure = samples_figure(simulated)
+    grid = np.array(figure.axes).reshape(2 * len(STATES), 5)
+    assert all(axis.images and not axis.collections for axis in grid[::2].ravel())
+    assert all(axis.collections and not axis.images for axis in grid[1::2].ravel())
+    assert [axis.get_ylabel() for axis in grid[::2, 0]] == list(STATES)
+
+
+def test_a_missing_sample_is_named(simulated: PreparedDataset) -> None:
+    rows = [row for row in simulated.rows if (row["state"], row["region"]) != ("open", "blue")]
+    without = PreparedDataset(simulated.folder, simulated.description, rows, simulated.clouds, None)
+    texts = [text.get_text() for axis in samples_figure(without).axes for text in axis.texts]
+    assert texts == ["no such sample"]
+
+
+def test_error_map_counts_errors(simulated: PreparedDataset, make_comparison: Callable[..., Path]) -> None:
+    wrong = {"dgcnn": {simulated.rows[k]["sample_id"]: "closed" for k in (2, 4, 5)}}
+    results = load_results(make_comparison(simulated, wrong))
+    figure = error_map(results, simulated)
+    assert figure is not None
+    titles = [axis.get_title() for axis in figure.axes]
+    assert titles == ["pointnet: 0 misclassified", "dgcnn: 3 misclassified"]
+    markers = [len(np.asarray(c.get_offsets())) for c in figure.axes[1].collections[1:]]
+    assert sum(markers) == 3
+
+
+def test_no_error_map_without_errors(
+    simulated: PreparedDataset, make_comparison: Callable[..., Path]
+) -> None:
+    assert error_map(load_results(make_comparison(simulated)), simulated) is None
+
+
+def test_confusion_figure_prints_the_counts(
+    imported: PreparedDataset, make_comparison: Callable[..., Path]
+) -> None:
+    results = load_results(make_comparison(imported, {"dgcnn": {"open/3": "closed"}}))
+    texts = [[text.get_text() for text in axis.texts] for axis in confusion_figure(results).axes]
+    assert texts[1] == ["20", "0", "0", "0", "20", "0", "1", "0", "19"]
+
+
+def test_spread_figure_shows_each_finished_fold(
+    imported: PreparedDataset, make_comparison: Callable[..., Path]
+) -> None:
+    results = load_results(make_comparison(imported, missing=[("dgcnn", 0)]))
+    axis = spread_figure(results, imported).axes[0]
+    assert [len(np.atleast_1d(line.get_xdata())) for line in axis.lines] == [2, 5, 1, 2, 4, 1]
+
+
+def test_learning_figure_without_logs(
+    imported: PreparedDataset, make_comparison: Callable[..., Path]
+) -> None:
+    folder = make_comparison(imported)
+    for log in (folder / "runs" / "pointnet").rglob("log.csv"):
+        log.unlink()
+    top_left, top_right = learning_figure(load_results(folder)).axes[:2]
+    assert [text.get_text() for text in top_left.texts] == ["no log"]
+    assert list(top_right.texts) == []
+    # Training and validation loss of five folds, and a dot at the kept epoch of each.
+    assert len(top_right.lines) == 20
+    dots = [line for line in top_right.lines if line.get_linestyle() == "None"]
+    assert {float(np.asarray(line.get_xdata())[0]) for line in dots} == {2.0}
+    assert top_right.lines[0].get_ydata() == pytest.approx([1, 1 / 2, 1 / 3])

@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which errors become cards, and clouds that read back to the millimetre."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from doorstate.dataset.store import PreparedDataset
+from doorstate.evaluation import gallery as gallery_module
+from doorstate.evaluation.gallery import build_gallery
+from doorstate.evaluation.results import load_results
+
+
+def test_cards_of_a_simulated_comparison(
+    simulated: PreparedDataset, make_comparison: Callable[..., Path]
+) -> None:
+    twin, both, one = (simulated.rows[k]["sample_id"] for k in (2, 4, 6))
+    wrong = {
+        "pointnet": {twin: "semi_open", both: "open"},
+        "dgcnn": {twin: "semi_open", both: "open", one: "open"},
+    }
+    gallery = build_gallery(load_results(make_comparison(simulated, wrong)), simulated)
+    # Decidable ones first, then those that more networks missed.
+    assert [card.sample_id for card in gallery.cards] == [both, one, twin]
+    assert [card.undecidable for card in gallery.cards] == [False, False, True]
+    assert [[answer.network for answer in card.answers] for card in gallery.cards] == [
+        ["pointnet", "dgcnn"],
+        ["dgcnn"],
+        ["pointnet", "dgcnn"],
+    ]
+    assert gallery.left_out == {"pointnet": 0, "dgcnn": 0}
+    first = gallery.cards[0]
+    assert first.picture is not None
+    assert first.picture.startswith("data:image/jpeg;base64,/9j/")
+    row = simulated.rows[4]
+    assert any(row["region"] in fact for fact in first.facts)
+    assert any(row["distance_band"] in fact for fact in first.facts)
+    assert "same image as semi_open" in gallery.cards[2].facts
+
+
+def test_clouds_read_back_to_the_millimetre(
+    simulated: PreparedDataset, make_comparison: Callable[..., Path]
+) -> None:
+    name = simulated.rows[0]["sample_id"]
+    gallery = build_gallery(load_results(make_comparison(simulated, {"dgcnn": {name: "open"}})), simulated)
+    encoded = gallery.clouds[name]
+    points = np.frombuffer(base64.b64decode(encoded["points"] or ""), dtype="<i2").reshape(-1, 3) / 1000
+    np.testing.assert_allclose(points, simulated.cloud(0), atol=0.00051)
+    parts = np.frombuffer(base64.b64decode(encoded["parts"] or ""), dtype=np.uint8)
+    assert parts.tolist() == simulated.parts(0).tolist()  # type: ignore[union-attr]
+
+
+def test_far_points_are_kept_at_the_rim(
+    imported: PreparedDataset, make_comparison: Callable[..., Path]
+) -> None:
+    far = np.array(imported.clouds)
+    far[:, 0, 0] = 1e4
+    dataset = PreparedDataset(imported.folder, imported.description, imported.rows, far, None)
+    gallery = build_gallery(load_results(make_comparison(dataset, {"dgcnn": {"open/3": "closed"}})), dataset)
+    encoded = gallery.clouds["open/3"]
+    points = np.frombuffer(base64.b64decode(encoded["points"] or ""), dtype="<i2").reshape(-1, 3)
+    assert points[0, 0] == 32767
+    assert encoded["parts"] is None
+    assert gallery.cards[0].picture is None
+    assert gallery.cards[0].facts == ()
+
+
+def test_the_surest_errors_are_kept_and_the_rest_counted(
+    imported: PreparedDataset, make_comparison: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(gallery_module, "CARDS_PER_NETWORK", 2)
+    folder = make_comparison(imported, {"dgcnn": {f"open/{k}": "closed" for k in range(5)}})
+    for path in (folder / "runs" / "dgcnn").rglob("predictions.csv"):
+        text = path.read_text()
+        for name in ("open/1", "open/4"):
+            text = text.replace(f"{name},open,closed,0.7,0.15,0.15", f"{name},open,closed,0.9,0.05,0.05")
+        path.write_text(text)
+    gallery = build_gallery(load_results(folder), imported)
+    assert [card.sample_id for card in gallery.cards] == ["open/1", "open/4"]
+    assert gallery.left_out == {"pointnet": 0, "dgcnn": 3}
+    assert set(gallery.clouds) == {"open/1", "open/4"}

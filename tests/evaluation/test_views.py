@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The one oblique view, and the colours of points."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.colors import to_rgba
+
+from doorstate.evaluation.views import (
+    PART_COLORS,
+    REGION_COLORS,
+    STATE_COLORS,
+    VIEW_ELEVATION_RAD,
+    oblique_view,
+    point_colors,
+)
+from doorstate.types import STATES, Part
+
+AXES = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], dtype=np.float32)
+
+
+def test_the_view_is_a_rotation_seen_from_behind_and_above() -> None:
+    screen, _ = oblique_view(AXES)
+    ahead, left, up = screen
+    assert left[0] < 0  # the robot's left is left on the page
+    assert abs(up[0]) < 1e-12  # uprights stay upright
+    assert up[1] > 0
+    assert ahead[1] > 0  # farther floor lies higher on the page: the eye is above
+    # Two rows of an orthonormal matrix: what the view shows of the three axes has unit length in each direction.
+    np.testing.assert_allclose(screen.T @ screen, np.eye(2), atol=1e-12)
+    np.testing.assert_allclose(up[1], np.cos(VIEW_ELEVATION_RAD))
+
+
+def test_near_points_are_drawn_last() -> None:
+    near_to_far = np.array([[1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [3.0, 0.0, 0.0]], dtype=np.float32)
+    assert oblique_view(near_to_far)[1].tolist() == [2, 1, 0]
+
+
+def test_points_take_the_colour_of_their_part_or_of_their_height() -> None:
+    parts = np.array([Part.LEAF, Part.WALL, Part.LEAF], dtype=np.uint8)
+    colors = point_colors(AXES, parts)
+    np.testing.assert_allclose(colors[0], to_rgba(PART_COLORS[Part.LEAF]))
+    np.testing.assert_allclose(colors[1], to_rgba(PART_COLORS[Part.WALL]))
+    by_height = point_colors(AXES, None)
+    assert by_height.shape == (3, 4)
+    assert (by_height[0] == by_height[1]).all()
+    assert (by_height[0] != by_height[2]).any()
+
+
+def test_every_state_region_and_part_has_its_own_colour() -> None:
+    assert tuple(STATE_COLORS) == STATES
+    assert set(PART_COLORS) == set(Part)
+    for colors in (STATE_COLORS, REGION_COLORS, PART_COLORS):
+        assert len(set(colors.values())) == len(colors)
