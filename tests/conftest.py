@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A small simulated and prepared data set that many tests read and none changes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import torch
+
+from doorstate.dataset.prepare import prepare_dataset
+from doorstate.dataset.store import PreparedDataset
+from doorstate.simulation.generate import PRESETS
+from doorstate.simulation.run import SimulationSettings, simulate_dataset
+
+SMALL_POINTS = 160
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _one_thread() -> None:
+    """Small tensors are quicker on one thread, and the suite runs one process per processor."""
+    torch.set_num_threads(1)
+
+
+@pytest.fixture(scope="session")
+def simulated_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Twelve poses, 36 samples, with their organized clouds as PCD."""
+    folder = tmp_path_factory.mktemp("simulated") / "small"
+    settings = SimulationSettings(preset=PRESETS["ogurob"], seed=3, poses=12, raw=("pcd",))
+    simulate_dataset(folder, settings, workers=1)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def small_dataset(simulated_folder: Path, tmp_path_factory: pytest.TempPathFactory) -> PreparedDataset:
+    """The same samples with 160 points each."""
+    folder = tmp_path_factory.mktemp("prepared") / "small"
+    return prepare_dataset(simulated_folder, folder, SMALL_POINTS, workers=1).dataset

@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Comparisons: experiment files, folders, and a real kill -9."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from doorstate.dataset.splits import read_splits
+from doorstate.dataset.store import PreparedDataset
+from doorstate.errors import ConfigError, RunError
+from doorstate.simulation.manifest import read_csv
+from doorstate.training.comparison import Experiment, compare, load_experiment, prepare_comparison, runs_of
+
+CHANGES = {"epochs": 4, "batch_size": 8, "precision": "fp32"}
+
+
+def experiment(dataset: PreparedDataset, **changes: Any) -> Experiment:
+    values = {
+        "name": "test",
+        "dataset": str(dataset.folder),
+        "networks": ("pointnet2",),
+        "folds": 2,
+        "num_points": 128,
+        "recipe_changes": CHANGES,
+    }
+    return Experiment.model_validate(values | changes)
+
+
+def write(path: Path, text: str) -> Path:
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_options_win_over_the_file_and_the_file_over_defaults(tmp_path: Path) -> None:
+    path = write(
+        tmp_path / "mine.toml",
+        'dataset = "d"\nnum_points = 512\nseed = 4\n[recipe_changes]\nepochs = 5\nbatch_size = 4\n',
+    )
+    found = load_experiment(path, {"num_points": 256, "recipe_changes": {"epochs": 7}})
+    assert (found.name, found.num_points, found.seed, found.folds) == ("mine", 256, 4, 5)
+    assert found.recipe_changes == {"epochs": 7, "batch_size": 4}
+    assert found.recipe_of("pointnet").epochs == 7
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("dataset = ", "cannot be read as an experiment"),
+        ("x = 1", "Extra inputs are not permitted|Field required"),
+        ('dataset = "d"\nnetworks = ["pointnett"]', "did you mean 'pointnet'"),
+        ('dataset = "d"\nprotocol = "random"', "choose one of paper, by-pose"),
+        ('dataset = "d"\nrecipe = "best"', "choose common or authors"),
+        ('dataset = "d"\n[recipe_changes]\nepoch = 3', "recipe_changes: epoch: Extra inputs"),
+        ('dataset = "d"\nfolds = 6', "folds: Input should be less than or equal to 5"),
+    ],
+)
+def test_a_wrong_experiment_is_one_line(text: str, complaint: str, tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=complaint) as caught:
+        load_experiment(write(tmp_path / "mine.toml", text), {})
+    assert "\n" not in str(caught.value)
+
+
+def test_a_missing_experiment_is_named(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"gone\.toml"):
+        load_experiment(tmp_path / "gone.toml", {})
+
+
+@pytest.mark.parametrize("path", sorted(Path(__file__).parents[2].glob("experiments/*.toml")), ids=lambda p: p.name)
+def test_the_experiments_of_the_repository_are_valid(path: Path) -> None:
+    assert load_experiment(path, {}).name == path.stem
+
+
+def test_the_split_is_drawn_once(small_dataset: PreparedDataset, tmp_path: Path) -> None:
+    prepare_comparison(experiment(small_dataset), tmp_path / "c")
+    before = (tmp_path / "c" / "splits.csv").read_bytes()
+    prepare_comparison(experiment(small_dataset), tmp_path / "c")
+    assert (tmp_path / "c" / "splits.csv").read_bytes() == before
+    assert len(read_splits(tmp_path / "c" / "splits.csv")) == 5
+
+
+def test_another_comparison_in_the_same_folder_is_refused(small_dataset: PreparedDataset, tmp_path: Path) -> None:
+    prepare_comparison(experiment(small_dataset), tmp_path / "c")
+    with pytest.raises(RunError, match="another seed; choose another folder"):
+        prepare_comparison(experiment(small_dataset, seed=1), tmp_path / "c")
+
+
+def test_runs_go_fold_by_fold(small_dataset: PreparedDataset, tmp_path: Path) -> None:
+    both = experiment(small_dataset, networks=("pointnet", "dgcnn"))
+    assert [(run.network, run.fold) for run in runs_of(both, tmp_path)] == [
+        ("pointnet", 0),
+        ("dgcnn", 0),
+        ("pointnet", 1),
+        ("dgcnn", 1),
+    ]
+
+
+def outcome(folder: Path) -> dict[str, Any]:
+    """Everything a comparison found; not how long it took."""
+    found: dict[str, Any] = {}
+    for path in sorted(folder.rglob("metrics.json")):
+        metrics = json.loads(path.read_text())
+        metrics.pop("seconds")
+        found[str(path.relative_to(folder))] = metrics
+        predictions = path.with_name("predictions.csv")
+        found[str(predictions.relative_to(folder))] = read_csv(predictions)
+    return found
+
+
+SCRIPT = """
+import sys
+from pathlib import Path
+import torch
+from doorstate.training.comparison import Experiment, compare
+
+if __name__ == "__main__":
+    torch.set_num_threads(1)
+    experiment = Experiment.model_validate_json(Path(sys.argv[1]).read_text())
+    compare(experiment, Path(sys.argv[2]), jobs=int(sys.argv[3]))
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_killed_and_restarted_it_ends_the_same(jobs: int, small_dataset: PreparedDataset, tmp_path: Path) -> None:
+    settings = experiment(small_dataset)
+    write(tmp_path / "experiment.json", settings.model_dump_json())
+    script = write(tmp_path / "script.py", SCRIPT)
+    command = [sys.executable, script, tmp_path / "experiment.json", tmp_path / "killed", str(jobs)]
+
+    process = subprocess.Popen(command)
+    deadline = time.monotonic() + 120
+    while not list((tmp_path / "killed").rglob("checkpoint.pt")):
+        assert time.monotonic() < deadline
+        assert process.poll() is None
+        time.sleep(0.02)
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    time.sleep(1.0)  # workers end with their parent
+    assert len(outcome(tmp_path / "killed")) < 4, "killed too late to show anything"
+
+    subprocess.run(command, check=True, timeout=300)
+    compare(settings, tmp_path / "undisturbed")
+    assert outcome(tmp_path / "killed") == outcome(tmp_path / "undisturbed")
+    assert len(outcome(tmp_path / "killed")) == 4

@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One run: what it leaves behind, what it refuses, and that it goes on where it stopped."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from sklearn.metrics import f1_score
+
+from doorstate.clouds.augment import Augmentation
+from doorstate.dataset.splits import Role, draw_splits
+from doorstate.dataset.store import PreparedDataset
+from doorstate.errors import DatasetError, RunError
+from doorstate.simulation.manifest import read_csv
+from doorstate.training import fit as fit_module
+from doorstate.training.fit import RunConfig, fit
+from doorstate.training.recipes import Recipe, Stage
+from doorstate.training.weights import load_weights
+
+RECIPE = Recipe(
+    name="test",
+    epochs=3,
+    batch_size=8,
+    augmentation=Augmentation(yaw_deg=10, mirror=0.5, jitter=0.002),
+    precision="fp32",
+)
+
+
+def config(**changes: Any) -> RunConfig:
+    values: dict[str, Any] = {
+        "network": "pointnet2",
+        "dataset": "small",
+        "protocol": "paper",
+        "fold": 0,
+        "num_points": 128,
+        "seed": 1,
+        "recipe": RECIPE,
+    }
+    return RunConfig.model_validate(values | changes)
+
+
+@pytest.fixture(scope="module")
+def roles(small_dataset: PreparedDataset) -> dict[str, Role]:
+    return draw_splits(small_dataset.rows, "paper", 0)[0]
+
+
+@pytest.fixture(scope="module")
+def finished(
+    small_dataset: PreparedDataset, roles: dict[str, Role], tmp_path_factory: pytest.TempPathFactory
+) -> Path:
+    folder = tmp_path_factory.mktemp("run") / "whole"
+    fit(config(), small_dataset, roles, folder)
+    return folder
+
+
+def results(folder: Path) -> tuple[str, dict[str, Any], bytes]:
+    metrics = json.loads((folder / "metrics.json").read_text())
+    metrics.pop("seconds")
+    return (folder / "predictions.csv").read_text(), metrics, (folder / "weights.safetensors").read_bytes()
+
+
+def test_a_run_leaves_everything_needed_to_judge_it(finished: Path, roles: dict[str, Role]) -> None:
+    assert sorted(path.name for path in finished.iterdir()) == [
+        "config.json",
+        "environment.json",
+        "log.csv",
+        "metrics.json",
+        "predictions.csv",
+        "weights.safetensors",
+    ]
+    predictions = read_csv(finished / "predictions.csv")
+    assert {row["sample_id"] for row in predictions} == {name for name, role in roles.items() if role == "test"}
+    metrics = json.loads((finished / "metrics.json").read_text())
+    oracle = f1_score(
+        [row["state"] for row in predictions], [row["predicted"] for row in predictions], average="macro", zero_division=0
+    )
+    assert metrics["test_macro_f1"] == pytest.approx(oracle)
+    log = read_csv(finished / "log.csv")
+    assert [line["epoch"] for line in log] == ["0", "1", "2"]
+    best = max(float(line["val_macro_f1"]) for line in log)
+    assert metrics["val_macro_f1"] == pytest.approx(best, abs=1e-5)
+
+
+def test_the_saved_weights_give_the_saved_predictions(finished: Path, small_dataset: PreparedDataset) -> None:
+    from doorstate.clouds.preparation import normalize
+
+    network, card = load_weights(finished / "weights.safetensors")
+    assert card.num_points == 128
+    for row in read_csv(finished / "predictions.csv")[:3]:
+        cloud = small_dataset.cloud(small_dataset.index_of(row["sample_id"]))[:128]
+        with torch.no_grad():
+            probabilities = network(torch.from_numpy(normalize(cloud))[None]).softmax(1)[0].numpy()
+        found = [float(row[f"p_{state}"]) for state in ("closed", "semi_open", "open")]
+        np.testing.assert_allclose(found, probabilities, atol=2e-5)
+
+
+def test_a_finished_run_is_not_trained_again(
+    finished: Path, small_dataset: PreparedDataset, roles: dict[str, Role]
+) -> None:
+    before = {path.name: path.stat().st_mtime_ns for path in finished.iterdir()}
+    fit(config(), small_dataset, roles, finished)
+    assert {path.name: path.stat().st_mtime_ns for path in finished.iterdir()} == before
+
+
+@pytest.mark.parametrize("stop_after", [1, 2])
+def test_a_stopped_run_ends_as_if_it_had_not_been(
+    stop_after: int,
+    finished: Path,
+    small_dataset: PreparedDataset,
+    roles: dict[str, Role],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def stop(self: Any, epoch: int, loader: Any) -> tuple[float, float]:
+        if epoch == stop_after:
+            raise KeyboardInterrupt
+        return original(self, epoch, loader)
+
+    original = fit_module._Trainer._epoch
+    with monkeypatch.context() as patch:
+        patch.setattr(fit_module._Trainer, "_epoch", stop)
+        with pytest.raises(KeyboardInterrupt):
+            fit(config(), small_dataset, roles, tmp_path / "run")
+    assert (tmp_path / "run" / "checkpoint.pt").is_file()
+    torch.manual_seed(99)  # whatever happened to the global generator in between
+    fit(config(), small_dataset, roles, tmp_path / "run")
+    assert results(tmp_path / "run") == results(finished)
+
+
+def test_training_leaves_the_global_generator_alone(
+    small_dataset: PreparedDataset, roles: dict[str, Role], tmp_path: Path
+) -> None:
+    torch.manual_seed(5)
+    expected = torch.rand(1)
+    torch.manual_seed(5)
+    fit(config(recipe=RECIPE.model_copy(update={"epochs": 1})), small_dataset, roles, tmp_path / "run")
+    assert torch.equal(torch.rand(1), expected)
+
+
+def test_another_run_in_the_same_folder_is_refused(
+    finished: Path, small_dataset: PreparedDataset, roles: dict[str, Role]
+) -> None:
+    with pytest.raises(RunError, match="another fold, seed"):
+        fit(config(seed=2, fold=1), small_dataset, roles, finished)
+
+
+def test_a_damaged_checkpoint_is_named_and_not_unpickled(
+    small_dataset: PreparedDataset, roles: dict[str, Role], tmp_path: Path
+) -> None:
+    run = tmp_path / "run"
+    fit(config(recipe=RECIPE.model_copy(update={"epochs": 1})), small_dataset, roles, run)
+    (run / "metrics.json").unlink()
+
+    class Harm:
+        def __reduce__(self) -> tuple[Any, ...]:
+            return (Path.touch, (tmp_path / "harmed",))
+
+    torch.save({"network": Harm()}, run / "checkpoint.pt")
+    with pytest.raises(RunError, match=r"checkpoint\.pt: cannot be read"):
+        fit(config(recipe=RECIPE.model_copy(update={"epochs": 1})), small_dataset, roles, run)
+    assert not (tmp_path / "harmed").exists()
+
+
+def test_only_full_resolution_may_be_the_best_epoch(
+    small_dataset: PreparedDataset, roles: dict[str, Role], tmp_path: Path
+) -> None:
+    recipe = RECIPE.model_copy(update={"coarse_to_fine": (Stage(share=0.7, points=128),)})
+    metrics = fit(config(recipe=recipe, num_points=160), small_dataset, roles, tmp_path / "run")
+    assert [line["points"] for line in read_csv(tmp_path / "run" / "log.csv")] == ["128", "128", "160"]
+    assert metrics["best_epoch"] == 2
+
+
+def test_a_loss_that_is_no_number_stops_the_run(
+    small_dataset: PreparedDataset, roles: dict[str, Role], tmp_path: Path
+) -> None:
+    recipe = RECIPE.model_copy(update={"optimizer": "sgd", "learning_rate": 1e30, "gradient_clip": None, "warmup": 0.01})
+    with pytest.raises(RunError, match="try a lower learning rate"):
+        fit(config(recipe=recipe, network="dgcnn"), small_dataset, roles, tmp_path / "run")
+
+
+def test_a_split_without_samples_is_refused(small_dataset: PreparedDataset, tmp_path: Path) -> None:
+    everything: dict[str, Role] = {row["sample_id"]: "train" for row in small_dataset.rows}
+    with pytest.raises(DatasetError, match="0 samples for val"):
+        fit(config(), small_dataset, everything, tmp_path / "run")
+
+
+@pytest.mark.parametrize("name", ["pointnet", "dgcnn", "pointcnn", "point2sequence"])
+def test_every_network_trains_with_its_authors_recipe(
+    name: str, small_dataset: PreparedDataset, roles: dict[str, Role], tmp_path: Path
+) -> None:
+    from doorstate.training.recipes import AUTHORS
+
+    recipe = AUTHORS[name].model_copy(update={"epochs": 1, "batch_size": 8})
+    metrics = fit(config(network=name, recipe=recipe), small_dataset, roles, tmp_path / "run")
+    assert 0 <= metrics["test_macro_f1"] <= 1
