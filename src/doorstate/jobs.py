@@ -38,8 +38,8 @@ def run_pieces(
 ) -> None:
     """Call `work(piece, path)` for every piece whose file is missing; a killed run goes on where it was.
 
-    `work` must be a top-level function that writes `path` atomically. Its first error stops the job; finished pieces
-    stay.
+    `work` must be a top-level function that writes `path` atomically. Its first error stops the job as soon as the
+    pieces in work are done; finished pieces stay.
     """
     missing = [(piece, path) for piece, path in zip(pieces, paths, strict=True) if not path.exists()]
     done = len(pieces) - len(missing)
@@ -60,7 +60,8 @@ def run_pieces(
                 done += 1
                 progress(done, len(pieces))
         except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
+            # A second shutdown, by the with block, would not wait: workers would go on writing after the return.
+            pool.shutdown(cancel_futures=True)
             raise
 
 

@@ -35,7 +35,7 @@ def farthest_point_indices(points: Points, count: int) -> Indices:
         count: how many points to choose.
 
     Returns:
-        (count,) int64. Distinct points give distinct indices.
+        (count,) int64. Distinct points give distinct indices; when all are taken, the first is repeated.
 
     Raises:
         ValueError: wrong shape, not finite, or fewer points than asked.
@@ -52,8 +52,10 @@ def farthest_point_indices(points: Points, count: int) -> Indices:
     with_anchor = np.concatenate([(lowest - diagonal)[None], points])
     height = max(1, int(np.log2(len(with_anchor) / _POINTS_PER_LEAF)))
     choose = bucket_farthest_points if fpsample is None or len(with_anchor) < 4 else _fpsample_farthest_points
-    chosen: Indices = choose(with_anchor, count + 1, height)
-    return chosen[1:] - 1
+    indices = choose(with_anchor, count + 1, height)[1:] - 1
+    # When every distinct point is taken all are at distance 0, and of those the anchor comes first, as -1.
+    indices[indices < 0] = indices[0]
+    return indices
 
 
 def _fpsample_farthest_points(points: Points, count: int, height: int) -> Indices:

@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From raw points to a network's input: what is dropped, what is kept, what is refused and why."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from doorstate.clouds.preparation import MIN_POINTS, normalize, prepare_cloud
+from doorstate.clouds.sampling import farthest_point_indices
+from doorstate.errors import CloudContentError
+from doorstate.types import Points
+
+NAN, INF = np.nan, np.inf
+
+
+def cloud(count: int, seed: int = 0) -> Points:
+    return np.random.default_rng(seed).uniform(0.5, 4.0, (count, 3)).astype(np.float32)
+
+
+NOT_MEASURED = (
+    (NAN, NAN, NAN),
+    (NAN, 1.0, 1.0),
+    (1.0, -INF, 1.0),
+    (INF, INF, INF),
+    (0.0, 0.0, 0.0),
+    (1.0, 1.0, 3.4e38),
+)
+
+
+@given(seed=st.integers(0, 2**32 - 1), holes=st.lists(st.sampled_from(NOT_MEASURED), max_size=900))
+@settings(deadline=None, max_examples=30)
+def test_what_was_not_measured_is_dropped_and_indices_point_to_raw_rows(
+    seed: int, holes: list[tuple[float, float, float]]
+) -> None:
+    raw = cloud(400, seed)
+    raw = (
+        np.insert(raw, np.random.default_rng(seed).integers(0, 401, len(holes)), holes, axis=0)
+        if holes
+        else raw
+    )
+    points, indices = prepare_cloud(raw, 200)
+    assert points.dtype == np.float32
+    np.testing.assert_array_equal(points, raw[indices])
+    np.testing.assert_array_equal(points, cloud(400, seed)[farthest_point_indices(cloud(400, seed), 200)])
+
+
+def test_organized_clouds_are_taken_row_by_row() -> None:
+    raw = cloud(600).reshape(20, 30, 3)
+    raw[3, 4] = NAN
+    points, indices = prepare_cloud(raw, 300)
+    np.testing.assert_array_equal(points, raw.reshape(-1, 3)[indices])
+    assert 3 * 30 + 4 not in indices
+
+
+def test_a_small_cloud_gives_all_its_points_once() -> None:
+    points, indices = prepare_cloud(cloud(150), 4096)
+    assert sorted(indices) == list(range(150))
+    assert points.shape == (150, 3)
+
+
+def test_repeated_points_are_taken_once() -> None:
+    raw = np.tile(cloud(300), (3, 1))
+    for count in (299, 300, 500):
+        points, indices = prepare_cloud(raw, count)
+        assert len(indices) == len(np.unique(points, axis=0)) == min(count, 300)
+
+
+@pytest.mark.parametrize(
+    ("raw", "message"),
+    [
+        (np.zeros((0, 3)), "the cloud is empty: it holds no points"),
+        (np.full((500, 3), NAN), "none of the 500 points was measured: all are NaN or infinite"),
+        (np.full((500, 3), INF), "none of the 500 points was measured: all are NaN or infinite"),
+        (np.zeros((500, 3)), "all 500 measured points lie at the origin: the cloud holds no surface"),
+        (cloud(MIN_POINTS - 1), "too few points: 127 measured, at least 128 are needed"),
+        (np.ones((500, 3)), "too few points: 1 distinct of 500 measured, at least 128 are needed"),
+        (cloud(500) * 1000, "half of the points are more than .* m away: millimetres[?] say --units mm"),
+        (
+            cloud(500) / 1000,
+            "half of the points are within .* mm of the camera: kilometres[?] say --units km",
+        ),
+    ],
+)
+def test_a_cloud_that_cannot_be_used_is_refused_in_one_line(raw: Points, message: str) -> None:
+    with pytest.raises(CloudContentError, match=f"^{message}$"):
+        prepare_cloud(raw, 200)
+
+
+def test_fewer_points_than_the_least_are_kept_where_so_few_are_asked_for() -> None:
+    assert prepare_cloud(cloud(500), 16).points.shape == (16, 3)
+
+
+def test_zeros_for_what_did_not_return_are_no_reason_to_doubt_the_units() -> None:
+    raw = np.concatenate([np.zeros((2000, 3), np.float32), cloud(500)])
+    assert prepare_cloud(raw, 200).indices.min() >= 2000
+
+
+@given(seed=st.integers(0, 2**32 - 1), offset=st.floats(-20, 20))
+@settings(deadline=None, max_examples=30)
+def test_normalized_clouds_are_centred_and_in_units_of_three_metres(seed: int, offset: float) -> None:
+    points = cloud(200, seed) + np.float32(offset)
+    batch = np.stack([points, points * 2])
+    found = normalize(batch)
+    assert found.dtype == np.float32
+    assert np.abs(found.mean(axis=1, dtype=np.float64)).max() < 1e-6
+    np.testing.assert_allclose(found[0] * 3, points - points.mean(axis=0, dtype=np.float64), atol=1e-5)
+    np.testing.assert_array_equal(found[1], normalize(points * 2))

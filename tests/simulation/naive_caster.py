@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Oracle of the caster: one ray, one box, one axis at a time, in plain Python."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from doorstate.clouds.camera import Intrinsics
+from doorstate.simulation.scene import Box
+from doorstate.simulation.sensor import CameraPose
+from doorstate.types import Part
+
+Vector = tuple[float, float, float]
+
+
+def turn_z(vector: Vector, angle_rad: float) -> Vector:
+    x, y, z = vector
+    return (
+        x * math.cos(angle_rad) - y * math.sin(angle_rad),
+        x * math.sin(angle_rad) + y * math.cos(angle_rad),
+        z,
+    )
+
+
+def pixel_ray(row: int, column: int, pose: CameraPose, camera: Intrinsics) -> Vector:
+    """Direction in the door frame with a forward part of one, so that its length counts z-depth."""
+    left, up = (camera.cx - column) / camera.fx, (camera.cy - row) / camera.fy
+    cos, sin = math.cos(pose.pitch_rad), math.sin(pose.pitch_rad)
+    # Pitch turns about y, and a positive one looks down.
+    return turn_z((cos + up * sin, left, up * cos - sin), pose.yaw_rad)
+
+
+def box_depth(box: Box, origin: Vector, ray: Vector) -> float:
+    """Where the ray enters the box, infinite where it does not."""
+    offset = turn_z(tuple(a - b for a, b in zip(origin, box.center_m, strict=True)), -box.yaw_rad)
+    direction = turn_z(ray, -box.yaw_rad)
+    enter, leave = 0.0, math.inf
+    for axis in range(3):
+        half = box.size_m[axis] / 2
+        if direction[axis] == 0:
+            if abs(offset[axis]) > half:
+                return math.inf
+            continue
+        crossings = sorted((side * half - offset[axis]) / direction[axis] for side in (-1, 1))
+        enter, leave = max(enter, crossings[0]), min(leave, crossings[1])
+    return enter if enter <= leave else math.inf
+
+
+def cast(boxes: Sequence[Box], pose: CameraPose, camera: Intrinsics) -> tuple[np.ndarray, np.ndarray]:
+    """Depth and part of every pixel."""
+    depth = np.full((camera.height, camera.width), np.inf)
+    part = np.full(depth.shape, int(Part.NONE))
+    for row in range(camera.height):
+        for column in range(camera.width):
+            ray = pixel_ray(row, column, pose, camera)
+            for box in boxes:
+                found = box_depth(box, pose[:3], ray)
+                if found < depth[row, column]:
+                    depth[row, column], part[row, column] = found, box.part
+    return depth, part

@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Twenty frames rendered by Gazebo 11.1: our caster sees the same, and our doors are the doors it was given."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from doorstate.simulation.scene import Box, Door, build_scene
+from doorstate.simulation.sensor import CAMERAS, CameraPose, cut_range, render
+from doorstate.types import Part
+
+GAZEBO = Path(__file__).resolve().parents[1] / "fixtures" / "gazebo"
+FRAMES: list[dict[str, Any]] = json.loads((GAZEBO / "scenes.json").read_text(encoding="utf-8"))
+# These also have side walls, ceilings or furniture that no door brings along.
+FURNISHED = {15, 16, 17, 19}
+
+
+def fixture_boxes(frame: dict[str, Any]) -> list[Box]:
+    return [
+        Box(Part[box["part"].upper()], tuple(box["center"]), tuple(box["size"]), box["yaw"])
+        for box in frame["boxes"]
+    ]
+
+
+def corners(box: Box) -> NDArray[np.float64]:
+    signs = np.array(list(itertools.product((-0.5, 0.5), repeat=3)))
+    cos, sin = math.cos(box.yaw_rad), math.sin(box.yaw_rad)
+    rotation = np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1]])
+    return signs * np.array(box.size_m) @ rotation.T + np.array(box.center_m)  # (8, 3)
+
+
+def same_box(one: Box, other: Box) -> bool:
+    apart = np.linalg.norm(corners(one)[:, None] - corners(other)[None], axis=-1)
+    return one.part == other.part and max(apart.min(axis=0).max(), apart.min(axis=1).max()) < 1e-4
+
+
+def matches(boxes: Sequence[Box], others: Sequence[Box]) -> list[list[int]]:
+    """For every box, which of the others it is."""
+    return [[number for number, other in enumerate(others) if same_box(box, other)] for box in boxes]
+
+
+def test_the_caster_equals_gazebo() -> None:
+    with np.load(GAZEBO / "depth.npz") as stored:
+        expected = stored["depth"]
+    camera = CAMERAS["xtion-gazebo"]
+    found = np.empty_like(expected)
+    for number, frame in enumerate(FRAMES):
+        at = frame["camera"]
+        pose = CameraPose(at["x"], at["y"], at["z"], at["yaw"], at["pitch"])
+        found[number] = cut_range(render(fixture_boxes(frame), pose, camera.intrinsics()), camera).depth_m
+    assert expected.shape == (20, 480, 640)
+    measured = np.isfinite(expected)
+    assert measured.mean() > 0.5
+    one_sided = int((measured != np.isfinite(found)).sum())
+    apart_m = np.abs(expected - found)[measured & np.isfinite(found)]
+    assert np.quantile(apart_m, 0.999) < 1e-4
+    assert one_sided + int((apart_m > 1e-3).sum()) < 1e-4 * expected.size
+
+
+@pytest.mark.parametrize("frame", FRAMES, ids=lambda frame: frame["name"])
+def test_the_door_is_the_one_gazebo_was_given(frame: dict[str, Any]) -> None:
+    door = Door(hinge=frame["hinge"], swing=frame["swing"])
+    ours = build_scene(door, math.radians(frame["opening_angle_deg"]))
+    theirs = fixture_boxes(frame)
+    found = matches(ours, theirs)
+    assert all(len(match) == 1 for match in found)
+    assert len({match[0] for match in found}) == len(ours)
+    extra = len(theirs) - len(ours)
+    assert extra > 0 if frame["index"] in FURNISHED else extra == 0

@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Resumable jobs: only what is missing is done, errors surface, and nobody outlives a killed parent."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from doorstate.files import write_text
+from doorstate.jobs import default_workers, piece_paths, run_pieces
+
+SCRIPT = """
+import sys
+import time
+from pathlib import Path
+
+from doorstate.jobs import piece_paths, run_pieces
+
+
+def work(piece, path):
+    path.write_text("begun")
+    time.sleep(600)
+
+
+if __name__ == "__main__":
+    folder = Path(sys.argv[1])
+    run_pieces(work, [1, 2], piece_paths(folder, 2, ".txt"), 2)
+"""
+
+
+def square(piece: int, path: Path) -> None:
+    write_text(path, str(piece**2))
+
+
+def square_of_positive(piece: int, path: Path) -> None:
+    if piece < 0:
+        raise ValueError(f"{piece} is negative")
+    square(piece, path)
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_runs_what_is_missing_and_counts_all(tmp_path: Path, workers: int) -> None:
+    paths = piece_paths(tmp_path, 5, ".txt")
+    assert paths[4] == tmp_path / "00004.txt"
+    write_text(paths[1], "kept")
+    steps: list[tuple[int, int]] = []
+    run_pieces(square, [0, 1, 2, 3, 4], paths, workers, lambda *step: steps.append(step))
+    assert [path.read_text(encoding="utf-8") for path in paths] == ["0", "kept", "4", "9", "16"]
+    assert steps == [(done, 5) for done in range(1, 6)]
+    run_pieces(square, [9, 9, 9, 9, 9], paths, workers, lambda *step: steps.append(step))
+    assert paths[0].read_text(encoding="utf-8") == "0"
+    assert steps[-1] == (5, 5)
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_an_error_surfaces_and_finished_pieces_stay(tmp_path: Path, workers: int) -> None:
+    paths = piece_paths(tmp_path, 4, ".txt")
+    with pytest.raises(ValueError, match=r"^-3 is negative$"):
+        run_pieces(square_of_positive, [1, 2, 5, -3], paths, workers)
+    assert [path.exists() for path in paths] == [True, True, True, False]
+    run_pieces(square_of_positive, [1, 2, 5, 3], paths, workers)
+    assert paths[3].read_text(encoding="utf-8") == "9"
+
+
+def test_an_error_leaves_out_what_has_not_begun(tmp_path: Path) -> None:
+    paths = piece_paths(tmp_path, 3, ".txt")
+    with pytest.raises(ValueError, match="negative"):
+        run_pieces(square_of_positive, [1, -2, 3], paths, 1)
+    assert [path.exists() for path in paths] == [True, False, False]
+
+
+def test_pieces_and_paths_must_belong_together(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="shorter"):
+        run_pieces(square, [1, 2], piece_paths(tmp_path, 1, ".txt"), 1)
+
+
+def test_workers_end_when_their_parent_is_killed(tmp_path: Path) -> None:
+    script, folder = tmp_path / "job.py", tmp_path / "pieces"
+    folder.mkdir()
+    script.write_text(SCRIPT, encoding="utf-8")
+    with subprocess.Popen([sys.executable, script, folder], stdout=subprocess.PIPE) as parent:
+        waited_until = time.monotonic() + 60
+        while len(list(folder.iterdir())) < 2:
+            assert parent.poll() is None
+            assert time.monotonic() < waited_until
+            time.sleep(0.01)
+        parent.send_signal(signal.SIGKILL)
+        # Workers inherited the pipe and sleep for minutes: it ends early only if they are ended.
+        parent.communicate(timeout=30)
+
+
+def test_there_is_always_a_worker() -> None:
+    assert default_workers() >= 1
