@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Arc, Rectangle
+from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
 from doorstate.dataset.store import PreparedDataset
@@ -20,8 +20,9 @@ from doorstate.evaluation.metrics import Floats
 from doorstate.evaluation.results import ComparisonResults
 from doorstate.evaluation.stratum_tables import is_undecidable
 from doorstate.evaluation.views import REGION_COLORS, STATE_COLORS
-from doorstate.simulation.scene import Door
-from doorstate.types import STATES
+from doorstate.simulation.manifest import unflatten
+from doorstate.simulation.scene import Door, build_scene
+from doorstate.types import STATES, Part
 
 _RINGS_M = (1.5, 2.0, 2.5, 3.0, 3.5)
 _INK, _FAINT = "#333333", "#BBBBBB"
@@ -41,7 +42,7 @@ def poses_figure(dataset: PreparedDataset) -> Figure | None:
     region = np.array([row["region"] for row in poses.values()])
     figure = Figure(figsize=(9.0, 5.6), layout="constrained")
     axis = figure.subplots()
-    _draw_ground(axis)
+    _draw_ground(axis, _door_of(dataset))
     ahead = position + 0.07 * np.stack([np.cos(heading_rad), np.sin(heading_rad)], axis=1)
     for name, color in REGION_COLORS.items():
         inside = region == name
@@ -78,7 +79,7 @@ def error_map(results: ComparisonResults, dataset: PreparedDataset) -> Figure | 
             dataset.rows[dataset.index_of(e.sample_id)] for e in results.error_rows if e.network == network
         ]
         axis.scatter(*everywhere.T, s=2, color=_FAINT, linewidths=0, rasterized=True)
-        _draw_ground(axis, lettering=False)
+        _draw_ground(axis, _door_of(dataset), lettering=False)
         for state in STATES:
             for undecidable in (False, True):
                 chosen = [r for r in wrong if r["state"] == state and is_undecidable(r) == undecidable]
@@ -108,6 +109,12 @@ def error_map(results: ComparisonResults, dataset: PreparedDataset) -> Figure | 
     return figure
 
 
+def _door_of(dataset: PreparedDataset) -> Door:
+    """The door of a simulated data set; of another, a sketch with the simulator's sizes."""
+    row = dataset.rows[0]
+    return unflatten(row).door if "door.hinge" in row else Door()
+
+
 def _posed_rows(dataset: PreparedDataset) -> list[dict[str, str]]:
     return [row for row in dataset.rows if all(row.get(name) for name in _POSE_COLUMNS)]
 
@@ -117,21 +124,28 @@ def _positions(rows: Sequence[dict[str, str]]) -> Floats:
     return np.array([(float(row["x_m"]), float(row["y_m"])) for row in rows], dtype=np.float64).reshape(-1, 2)
 
 
-def _draw_ground(axis: Axes, lettering: bool = True) -> None:
-    """Draw wall, opening, leaf, rings and region borders; the door is a sketch with the simulator's sizes."""
-    door = Door()
+def _draw_ground(axis: Axes, door: Door, lettering: bool = True) -> None:
+    """Draw wall, opening, the leaf at 0, 45 and 90 degrees, rings and region borders."""
     half, thick = door.opening_width_m / 2, door.wall_thickness_m
     for left in (-3.9, half):
         axis.add_patch(
             Rectangle((left, -thick), 3.9 - half, thick, facecolor="#8C8C8C", edgecolor=_INK, linewidth=0.6)
         )
-    hinge = np.array([half, -thick])
-    for angle_deg, style in ((0.0, ":"), (45.0, "-"), (90.0, ":")):
-        turn = math.radians(180.0 + angle_deg)
-        tip = hinge + door.opening_width_m * np.array([math.cos(turn), math.sin(turn)])
-        axis.plot(*np.stack([hinge, tip]).T, color="#7A4B1E", linewidth=2.0, linestyle=style)
-    reach = 2 * door.opening_width_m
-    axis.add_patch(Arc(tuple(hinge), reach, reach, theta1=180, theta2=270, color="#7A4B1E", linewidth=0.6))
+    for angle_deg, alpha in ((0.0, 0.3), (45.0, 1.0), (90.0, 0.3)):
+        leaf = next(box for box in build_scene(door, math.radians(angle_deg)) if box.part == Part.LEAF)
+        width, depth = leaf.size_m[:2]
+        corner = (leaf.center_m[0] - width / 2, leaf.center_m[1] - depth / 2)
+        outline = Rectangle(
+            corner,
+            width,
+            depth,
+            angle=math.degrees(leaf.yaw_rad),
+            rotation_point="center",
+            facecolor="#7A4B1E",
+            alpha=alpha,
+            linewidth=0,
+        )
+        axis.add_patch(outline)
     bearing = np.linspace(0.0, math.pi, 181)
     for radius in _RINGS_M:
         axis.plot(radius * np.cos(bearing), radius * np.sin(bearing), color=_FAINT, linewidth=0.7, zorder=1)
