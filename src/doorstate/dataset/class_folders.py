@@ -16,12 +16,12 @@ from doorstate.types import DoorState
 
 # Order matters: "semi-open" and "half closed" hold the other words too.
 _SPELLINGS = (
-    (DoorState.SEMI_OPEN, re.compile(r"semi|half|ajar|part(ly|ial)|aralik")),
+    (DoorState.SEMI_OPEN, re.compile(r"semi|half|yari|ajar|part(ly|ial)|aralik")),
     (DoorState.CLOSED, re.compile(r"clos|shut|kapali")),
     (DoorState.OPEN, re.compile(r"open|acik")),
 )
 _WORDS = re.compile(
-    r"(semi|half|ajar|partly|partially|partial|opened|open|closed|close|shut|doors?|is|the|aralik|kapali|acik)+"
+    r"(semi|half|yari|ajar|partly|partially|partial|opened|open|closed|close|shut|doors?|is|the|aralik|kapali|acik)+"
 )
 
 
@@ -44,6 +44,7 @@ def labelled_rows(root: Path, poses_csv: Path | None = None) -> list[dict[str, s
             `distance_m,robot_angle_deg`; further columns are kept.
 
     Raises:
+        CloudReadError: no cloud at all.
         DatasetError: no class folder, or the CSV lacks a column or names a file twice.
     """
     if not root.is_dir():

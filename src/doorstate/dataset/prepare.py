@@ -65,8 +65,8 @@ def prepare_dataset(
 ) -> PreparationSummary:
     """Prepare a simulated folder or class folders of clouds into `folder`.
 
-    A cloud with fewer than `num_points` measured points, or that cannot be read, is left out and listed in `rejected.csv`
-    with the reason: every cloud of a prepared data set has exactly `num_points` distinct points.
+    A cloud with fewer than `num_points` distinct points, or that cannot be read, is left out and listed in
+    `rejected.csv` with the reason: every cloud of a prepared data set has exactly `num_points` distinct points.
 
     Raises:
         ConfigError: `folder` holds something prepared from another source or with other settings.
@@ -77,7 +77,12 @@ def prepare_dataset(
     rows = _simulated_rows(source) if simulated else labelled_rows(source, poses_csv)
     _claim(
         folder,
-        {"source": str(source.resolve()), "num_points": num_points, "options": repr(options), "rows": _digest(rows)},
+        {
+            "source": str(source.resolve()),
+            "num_points": num_points,
+            "options": repr(options),
+            "rows": _digest(rows),
+        },
     )
     scratch = folder / "pieces"
     if (folder / DESCRIPTION).exists():
@@ -175,7 +180,7 @@ def _exactly(points: Points, num_points: int) -> tuple[Points, np.ndarray]:
     prepared = prepare_cloud(points, num_points)
     if len(prepared.points) < num_points:
         raise CloudContentError(
-            f"too few points: {len(prepared.points)} measured, {num_points} asked for (--points)"
+            f"too few points: {len(prepared.points)} distinct, {num_points} asked for (--points)"
         )
     return prepared
 

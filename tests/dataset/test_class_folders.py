@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Folders as people name them, and poses as people write them down."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from doorstate.dataset.class_folders import labelled_rows, state_of_folder
+from doorstate.errors import CloudReadError, DatasetError
+
+SPELLINGS = {
+    "open": ["open", "Open", "OPEN", "opened", "open_door", "Open Doors", "02-open", "door_is_open", "acik"],
+    "semi_open": [
+        "semi",
+        "SEMI-OPEN",
+        "semi_open",
+        "SemiOpen",
+        "semiopen_doors",
+        "half open",
+        "half_closed",
+        "partly open",
+        "partially-opened",
+        "ajar",
+        "aralik",
+        "yari_acik",
+    ],
+    "closed": ["closed", "Closed Doors", "01_closed", "close", "shut", "The door is closed", "kapali_1"],
+}
+NO_STATES = [
+    "opening_times",
+    "enclosure",
+    "data",
+    "doors",
+    "door",
+    "",
+    "2019",
+    "openai",
+    "train",
+    "pcd",
+    "clothes",
+]
+
+
+@pytest.mark.parametrize(
+    ("name", "state"), [(name, state) for state, names in SPELLINGS.items() for name in names]
+)
+def test_usual_spellings_of_the_states(name: str, state: str) -> None:
+    found = state_of_folder(name)
+    assert found is not None
+    assert found.label == state
+
+
+@pytest.mark.parametrize("name", NO_STATES)
+def test_other_names_are_no_states(name: str) -> None:
+    assert state_of_folder(name) is None
+
+
+def touch(root: Path, *names: str) -> Path:
+    for name in names:
+        (root / name).parent.mkdir(parents=True, exist_ok=True)
+        (root / name).touch()
+    return root
+
+
+def test_the_nearest_folder_that_names_a_state_decides(tmp_path: Path) -> None:
+    root = touch(
+        tmp_path / "doors",
+        "Train/Closed/1.pcd",
+        "Test/Closed/run 2/1.pcd",
+        "closed/but_then/Open/a.ply",
+        "stray.pcd",
+        "opening_times/b.pcd",
+        "semi/.hidden.pcd",
+        "semi/c.jpg",
+    )
+    assert labelled_rows(root) == [
+        {"sample_id": "closed/but_then/Open/a", "state": "open", "file": "closed/but_then/Open/a.ply"},
+        {"sample_id": "Test/Closed/run 2/1", "state": "closed", "file": "Test/Closed/run 2/1.pcd"},
+        {"sample_id": "Train/Closed/1", "state": "closed", "file": "Train/Closed/1.pcd"},
+    ]
+
+
+def test_the_root_itself_may_name_the_state(tmp_path: Path) -> None:
+    rows = labelled_rows(touch(tmp_path / "open_doors", "a.pcd", "closed/b.pcd"))
+    assert [(row["file"], row["state"]) for row in rows] == [("a.pcd", "open"), ("closed/b.pcd", "closed")]
+
+
+def test_files_of_one_name_and_two_types_are_two_samples(tmp_path: Path) -> None:
+    rows = labelled_rows(touch(tmp_path / "d", "open/a.pcd", "open/a.ply", "open/b.pcd", "closed/a.pcd"))
+    assert [row["sample_id"] for row in rows] == ["closed/a", "open/a.pcd", "open/a.ply", "open/b"]
+
+
+def test_folders_without_states_or_clouds_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(DatasetError, match="is not a folder"):
+        labelled_rows(tmp_path / "nowhere")
+    with pytest.raises(CloudReadError, match="no clouds in this folder"):
+        labelled_rows(touch(tmp_path / "empty", "open/readme.md"))
+    with pytest.raises(DatasetError, match="no clouds in folders named after the states"):
+        labelled_rows(touch(tmp_path / "other", "cats/1.pcd", "dogs/1.pcd"))
+
+
+@pytest.fixture
+def root(tmp_path: Path) -> Path:
+    return touch(tmp_path / "doors", "open/1.pcd", "closed/1.pcd", "closed/2.pcd")
+
+
+def poses(folder: Path, text: str) -> Path:
+    path = folder / "poses.csv"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("header", "pose"),
+    [("x_m,y_m", "-1.5,2.0"), ("distance_m,robot_angle_deg", "2.5,126.869897646")],
+)
+def test_poses_in_both_forms_bring_the_same_strata(root: Path, header: str, pose: str) -> None:
+    csv = poses(root.parent, f"file,{header},light\nclosed/1.pcd,{pose},dim\n")
+    posed, unposed, _ = labelled_rows(root, csv)
+    assert float(posed["distance_m"]) == 2.5
+    assert float(posed["robot_angle_deg"]) == pytest.approx(126.8698976)
+    assert (posed["distance_band"], posed["region"], posed["light"]) == ("2.5-3.0", "yellow", "dim")
+    assert posed["pose_id"]
+    assert "region" not in unposed
+
+
+def test_a_bare_name_is_the_pose_of_every_state(root: Path) -> None:
+    csv = poses(root.parent, "file,x_m,y_m\n1.pcd,0,2\nclosed/2.pcd,0,3\n")
+    rows = {row["file"]: row for row in labelled_rows(root, csv)}
+    assert rows["open/1.pcd"]["pose_id"] == rows["closed/1.pcd"]["pose_id"] == "0.000,2.000"
+    assert rows["closed/2.pcd"]["distance_band"] == "3.0-3.5"
+
+
+def test_a_pose_has_the_name_that_is_given_to_it_but_no_label(root: Path) -> None:
+    csv = poses(root.parent, "file,pose_id,x_m,y_m,state,sample_id\n2.pcd,corner,1,1,open,x\n")
+    row = next(row for row in labelled_rows(root, csv) if row["file"] == "closed/2.pcd")
+    assert (row["pose_id"], row["state"], row["sample_id"]) == ("corner", "closed", "closed/2")
+    assert row["distance_band"] == "outside"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("name,x_m,y_m\n1.pcd,0,2\n", "line 2 has no value in column 'file'"),
+        ("file,x_m,y_m\n1.pcd,0,2\n,0,2\n", "line 3 has no value in column 'file'"),
+        ("file,x_m,y_m\n1.pcd,0,2\n1.pcd,0,3\n", "line 3 names '1.pcd' a second time"),
+        ("file,x_m\n1.pcd,0\n", "line 2: needs x_m and y_m, or distance_m and robot_angle_deg"),
+        ("file,x_m,y_m\n1.pcd,0,\n", "line 2: needs x_m and y_m"),
+        ("file,x_m,y_m\n1.pcd,0,two\n", "line 2: could not convert string to float: 'two'"),
+        ("file,x_m,y_m\n1.pcd,0,nan\n", "line 2: the pose must be finite numbers"),
+        ("file,distance_m,robot_angle_deg\n1.pcd,inf,90\n", "line 2: the pose must be finite numbers"),
+        ("file,x_m,y_m\n1.pcd,0,2\n3.pcd,0,2\n4.pcd,0,2\n", "2 files are not in .*, such as '3.pcd'"),
+        ("file,x_m,y_m\n1.pcd,0\n", "line 2 has another number of columns"),
+    ],
+)
+def test_wrong_poses_are_refused_by_line(root: Path, text: str, message: str) -> None:
+    with pytest.raises(DatasetError, match=rf"poses\.csv: .*{message}") as caught:
+        labelled_rows(root, poses(root.parent, text))
+    assert "\n" not in str(caught.value)
+
+
+def test_missing_poses_are_an_error(root: Path) -> None:
+    with pytest.raises(DatasetError, match=r"nowhere\.csv: cannot be read"):
+        labelled_rows(root, root / "nowhere.csv")

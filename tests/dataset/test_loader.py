@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Batches: every cloud once, normalised, the same from the same seed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from scipy.spatial.distance import pdist
+
+from doorstate.clouds.augment import Augmentation
+from doorstate.clouds.preparation import normalize
+from doorstate.dataset.loader import Batch, CloudLoader
+from doorstate.dataset.store import PreparedDataset, open_dataset
+from doorstate.errors import ConfigError, DatasetError
+
+NOTHING = Augmentation()
+
+
+@pytest.fixture
+def dataset(prepared: Path) -> PreparedDataset:
+    return open_dataset(prepared)
+
+
+@pytest.fixture
+def loader(dataset: PreparedDataset) -> CloudLoader:
+    return CloudLoader(dataset, [row["sample_id"] for row in dataset.rows], 40)
+
+
+def found_in(loader: CloudLoader, batches: list[Batch]) -> list[int]:
+    """Which of the loader's samples the clouds of batches are, by points and label."""
+    (everything,) = loader.in_order(len(loader))
+    places = []
+    for batch in batches:
+        for cloud, label in zip(batch.points, batch.labels, strict=True):
+            (place,) = (everything.points == cloud).all(dim=(1, 2)).nonzero().flatten().tolist()
+            assert label == everything.labels[place]
+            places.append(place)
+    return places
+
+
+def test_clouds_come_normalised_in_the_order_asked_for(dataset: PreparedDataset) -> None:
+    asked = ["s7", "s0", "s9", "s4", "s5"]
+    batches = list(CloudLoader(dataset, asked, 32).in_order(2))
+    assert [tuple(batch.points.shape) for batch in batches] == [(2, 32, 3), (2, 32, 3), (1, 32, 3)]
+    points, labels = torch.cat([b.points for b in batches]), torch.cat([b.labels for b in batches])
+    assert (points.dtype, labels.dtype) == (torch.float32, torch.int64)
+    for cloud, label, sample in zip(points, labels, asked, strict=True):
+        index = dataset.index_of(sample)
+        # The first points, then normalised: their own centroid is the origin.
+        np.testing.assert_array_equal(cloud, normalize(dataset.cloud(index)[:32]))
+        assert label == dataset.labels[index]
+    assert points.mean(dim=1).abs().max() < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("batch_size", "batches", "clouds"), [(3, 3, 9), (11, 1, 11), (1, 11, 11), (64, 1, 11)]
+)
+def test_an_epoch_shows_clouds_once_and_leaves_out_what_fills_no_batch(
+    loader: CloudLoader, batch_size: int, batches: int, clouds: int
+) -> None:
+    epoch = list(loader.shuffled(batch_size, NOTHING, (0, 0, 0)))
+    assert len(epoch) == batches
+    assert {len(batch.labels) for batch in epoch} == {min(batch_size, 11)}
+    places = found_in(loader, epoch)
+    assert len(places) == len(set(places)) == clouds
+
+
+def test_over_epochs_no_cloud_is_left_out_for_good(loader: CloudLoader) -> None:
+    seen = [set(found_in(loader, list(loader.shuffled(4, NOTHING, (0, 0, epoch))))) for epoch in range(12)]
+    assert set.union(*seen) == set(range(11))
+    assert len({frozenset(places) for places in seen}) > 1
+
+
+def test_a_seed_gives_the_same_epoch_and_another_seed_another(loader: CloudLoader) -> None:
+    everything = Augmentation(yaw_deg=30, mirror=0.5, scale=(0.9, 1.1), shift=0.1, jitter=0.01)
+    one, same, other = (list(loader.shuffled(4, everything, (1, 2, epoch))) for epoch in (3, 3, 4))
+    assert all(
+        torch.equal(a.points, b.points) and torch.equal(a.labels, b.labels)
+        for a, b in zip(one, same, strict=True)
+    )
+    assert not any(torch.equal(a.points, b.points) for a, b in zip(one, other, strict=True))
+
+
+def test_an_epoch_is_augmented_cloud_by_cloud_and_the_stored_clouds_are_not(loader: CloudLoader) -> None:
+    (before,) = loader.in_order(11)
+    plain = next(loader.shuffled(11, NOTHING, (5,)))
+    turned = next(loader.shuffled(11, Augmentation(yaw_deg=180), (5,)))
+    assert torch.equal(plain.labels, turned.labels)
+    assert torch.equal(plain.points[..., 2], turned.points[..., 2])
+    yaw_rad = []
+    for cloud, other in zip(plain.points.numpy(), turned.points.numpy(), strict=True):
+        np.testing.assert_allclose(pdist(other), pdist(cloud), rtol=1e-4, atol=1e-6)
+        yaw_rad.append(np.angle(complex(*other[0, :2]) / complex(*cloud[0, :2])))
+    assert len(np.unique(np.round(yaw_rad, 3))) == 11
+    (after,) = loader.in_order(11)
+    assert torch.equal(before.points, after.points)
+
+
+def test_more_points_than_there_are_or_unknown_samples_are_refused(dataset: PreparedDataset) -> None:
+    with pytest.raises(ConfigError, match="holds 40 points a cloud, not 41"):
+        CloudLoader(dataset, ["s0"], 41)
+    with pytest.raises(DatasetError, match="holds no sample 's99'"):
+        CloudLoader(dataset, ["s0", "s99"], 40)

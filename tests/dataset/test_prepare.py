@@ -1,0 +1,248 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Preparation end to end: every cloud the one its row tells of, whatever happened on the way."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from doorstate.clouds.io import ReadOptions, read_cloud
+from doorstate.clouds.pcd import write_pcd
+from doorstate.clouds.preparation import prepare_cloud
+from doorstate.dataset import prepare
+from doorstate.dataset.prepare import REJECTED, prepare_dataset
+from doorstate.dataset.store import CLOUDS, DESCRIPTION, MANIFEST, PARTS
+from doorstate.dataset.strata import distance_band, region
+from doorstate.errors import ConfigError, DatasetError
+from doorstate.simulation.generate import replay
+from doorstate.simulation.manifest import read_csv, unflatten, write_csv
+from doorstate.types import STATES, Part
+
+NUM_POINTS = 256
+FILES = (MANIFEST, CLOUDS, PARTS, DESCRIPTION, "preparation.json")
+
+
+@pytest.fixture
+def four_samples_a_piece(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(prepare, "_SAMPLES_PER_PIECE", 4)
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tiny_simulation: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("prepared") / "doors"
+    prepare_dataset(tiny_simulation, folder, NUM_POINTS, workers=1)
+    return folder
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+def test_clouds_and_parts_are_those_of_the_replayed_rows(tiny_simulation: Path, tmp_path: Path) -> None:
+    dataset, rejected = prepare_dataset(tiny_simulation, tmp_path / "doors", NUM_POINTS, workers=1)
+    assert rejected == []
+    assert (len(dataset), dataset.num_points, dataset.clouds.shape) == (15, NUM_POINTS, (15, NUM_POINTS, 3))
+    assert (dataset.description.kind, dataset.description.source) == ("simulated", "ogurob")
+    assert sorted(contents(tmp_path / "doors")) == sorted(FILES)
+    for index, row in enumerate(dataset.rows):
+        sample = unflatten(row)
+        frame = replay(sample)
+        points, raw_rows = prepare_cloud(frame.points, NUM_POINTS)
+        np.testing.assert_array_equal(dataset.cloud(index), points)
+        np.testing.assert_array_equal(dataset.parts(index), frame.cut.part.reshape(-1)[raw_rows])
+        assert (dataset.parts(index) != Part.NONE).all()
+        assert row["distance_band"] == distance_band(sample.distance_m)
+        assert row["region"] == region(sample.robot_angle_deg)
+        assert STATES[dataset.labels[index]] == sample.state
+    picture = dataset.image(3)
+    assert picture is not None
+    assert (picture.shape, picture.dtype) == ((120, 160, 3), np.uint8)
+
+
+@pytest.mark.usefixtures("four_samples_a_piece")
+def test_processes_make_the_same_files(tiny_simulation: Path, undisturbed: Path, tmp_path: Path) -> None:
+    prepare_dataset(tiny_simulation, tmp_path / "doors", NUM_POINTS, workers=2)
+    assert contents(tmp_path / "doors") == contents(undisturbed)
+
+
+@pytest.mark.usefixtures("four_samples_a_piece")
+def test_goes_on_with_the_pieces_that_are_left(
+    tiny_simulation: Path, undisturbed: Path, tmp_path: Path
+) -> None:
+    folder = tmp_path / "doors"
+
+    def stop_after_three(done: int, total: int) -> None:
+        if done == 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        prepare_dataset(tiny_simulation, folder, NUM_POINTS, workers=1, progress=stop_after_three)
+    assert sorted(path.name for path in folder.iterdir()) == ["pieces", "preparation.json"]
+    (folder / "pieces" / "00001.npz").unlink()
+    steps: list[tuple[int, int]] = []
+    prepare_dataset(tiny_simulation, folder, NUM_POINTS, workers=1, progress=lambda *step: steps.append(step))
+    assert steps == [(2, 4), (3, 4), (4, 4)]
+    assert contents(folder) == contents(undisturbed)
+
+
+@pytest.mark.parametrize(
+    "lost", [[DESCRIPTION], [DESCRIPTION, CLOUDS], [DESCRIPTION, CLOUDS, PARTS, MANIFEST]]
+)
+def test_a_preparation_that_stopped_before_its_end_is_made_whole(
+    tiny_simulation: Path, undisturbed: Path, tmp_path: Path, lost: list[str]
+) -> None:
+    shutil.copytree(undisturbed, tmp_path / "doors")
+    for name in lost:
+        (tmp_path / "doors" / name).unlink()
+    prepare_dataset(tiny_simulation, tmp_path / "doors", NUM_POINTS, workers=1)
+    assert contents(tmp_path / "doors") == contents(undisturbed)
+
+
+def test_a_whole_data_set_is_opened_and_left_over_pieces_are_cleared(
+    tiny_simulation: Path, undisturbed: Path, tmp_path: Path
+) -> None:
+    folder = tmp_path / "doors"
+    shutil.copytree(undisturbed, folder)
+    (folder / "pieces").mkdir()
+    (folder / "pieces" / "00000.npz").touch()
+    steps: list[tuple[int, int]] = []
+    found = prepare_dataset(
+        tiny_simulation, folder, NUM_POINTS, workers=1, progress=lambda *step: steps.append(step)
+    )
+    assert (len(found.dataset), steps) == (15, [(1, 1)])
+    assert contents(folder) == contents(undisturbed)
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "message"),
+    [
+        ("depth_sha256", "0" * 64, "renders differently than its manifest says"),
+        ("depth_sha256", None, "renders differently than its manifest says"),
+        ("opening_angle_deg", "44.0", "renders differently than its manifest says"),
+        ("distance_m", None, "column distance_m: Field required"),
+        ("distance_m", "far", "column distance_m: "),
+        ("door.hinge", "top", "column door.hinge: "),
+    ],
+)
+def test_a_manifest_that_was_changed_is_noticed(
+    tiny_simulation: Path, tmp_path: Path, column: str, value: str | None, message: str
+) -> None:
+    source = tmp_path / "changed"
+    shutil.copytree(tiny_simulation, source)
+    rows = read_csv(source / MANIFEST)
+    for row in rows if value is None else rows[4:5]:
+        row.pop(column)
+        if value is not None:
+            row[column] = value
+    write_csv(source / MANIFEST, rows)
+    with pytest.raises(DatasetError, match=message) as caught:
+        prepare_dataset(source, tmp_path / "doors", NUM_POINTS, workers=1)
+    assert rows[0 if value is None else 4]["sample_id"] in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_an_unfinished_simulation_is_not_prepared(tiny_simulation: Path, tmp_path: Path) -> None:
+    shutil.copytree(tiny_simulation, tmp_path / "unfinished")
+    (tmp_path / "unfinished" / MANIFEST).unlink()
+    with pytest.raises(DatasetError, match="the simulation is not complete; run 'doorstate simulate' again"):
+        prepare_dataset(tmp_path / "unfinished", tmp_path / "doors", NUM_POINTS, workers=1)
+
+
+def test_another_preparation_or_other_files_are_not_written_over(
+    tiny_simulation: Path, undisturbed: Path, tmp_path: Path
+) -> None:
+    before = contents(undisturbed)
+    with pytest.raises(ConfigError, match="holds a preparation of something else"):
+        prepare_dataset(tiny_simulation, undisturbed, NUM_POINTS // 2, workers=1)
+    (tmp_path / "mine.txt").touch()
+    for folder in (tmp_path, tmp_path / "mine.txt"):
+        with pytest.raises(ConfigError, match="holds something else"):
+            prepare_dataset(tiny_simulation, folder, NUM_POINTS, workers=1)
+    assert contents(undisturbed) == before
+
+
+@pytest.fixture
+def class_folders(tmp_path: Path) -> Path:
+    """Five good clouds, and files that are none."""
+    root = tmp_path / "OGUROB"
+    rng = np.random.default_rng(0)
+    for name in ("Open/a.pcd", "Open/b.pcd", "semi-open/a.pcd", "Closed/a.pcd", "Closed/b.pcd"):
+        write_pcd(root / name, rng.uniform(1, 4, (12, 50, 3)).astype(np.float32))
+    write_pcd(root / "Closed" / "small.pcd", rng.uniform(1, 4, (200, 3)).astype(np.float32))
+    write_pcd(root / "Closed" / "tiled.pcd", np.tile(rng.uniform(1, 4, (200, 3)), (2, 1)).astype(np.float32))
+    (root / "Open" / "broken.pcd").write_bytes((root / "Open" / "a.pcd").read_bytes()[:900])
+    (root / "Open" / "notes.txt").write_text("taken on Monday\n", encoding="utf-8")
+    (root / "Open" / "empty.csv").write_text("x,y,z\n", encoding="utf-8")
+    (root / "README.txt").write_text("no class folder", encoding="utf-8")
+    return root
+
+
+def test_files_of_class_folders_are_prepared_and_the_rest_listed_with_its_reason(
+    class_folders: Path, tmp_path: Path
+) -> None:
+    folder = tmp_path / "doors"
+    dataset, rejected = prepare_dataset(class_folders, folder, NUM_POINTS, workers=1)
+    assert {row["sample_id"]: row["state"] for row in dataset.rows} == {
+        "Closed/a": "closed",
+        "Closed/b": "closed",
+        "Open/a": "open",
+        "Open/b": "open",
+        "semi-open/a": "semi_open",
+    }
+    for index, row in enumerate(dataset.rows):
+        expected = prepare_cloud(read_cloud(class_folders / row["file"]), NUM_POINTS).points
+        np.testing.assert_array_equal(dataset.cloud(index), expected)
+    assert (dataset.description.kind, dataset.description.source) == ("imported", "OGUROB")
+    assert dataset.parts(0) is None
+    assert dataset.image(0) is None
+    reasons = {row["file"]: row["reason"] for row in rejected}
+    assert reasons.keys() == {
+        "Closed/small.pcd",
+        "Closed/tiled.pcd",
+        "Open/broken.pcd",
+        "Open/empty.csv",
+        "Open/notes.txt",
+    }
+    assert reasons["Closed/small.pcd"] == "too few points: 200 distinct, 256 asked for (--points)"
+    assert reasons["Closed/tiled.pcd"] == "too few points: 200 distinct, 256 asked for (--points)"
+    assert reasons["Open/empty.csv"] == "the cloud is empty: it holds no points"
+    assert reasons["Open/notes.txt"].startswith("notes.txt: expected rows of numbers")
+    assert reasons["Open/broken.pcd"].startswith("broken.pcd: ")
+    assert read_csv(folder / REJECTED) == rejected
+    again = prepare_dataset(class_folders, folder, NUM_POINTS, workers=1)
+    assert again.rejected == rejected
+
+
+def test_poses_bring_strata_and_read_options_are_obeyed(class_folders: Path, tmp_path: Path) -> None:
+    poses = tmp_path / "poses.csv"
+    poses.write_text("file,x_m,y_m,room\nOpen/a.pcd,0.0,2.2,hall\n", encoding="utf-8")
+    options = ReadOptions(frame="optical")
+    dataset = prepare_dataset(class_folders, tmp_path / "doors", NUM_POINTS, poses, options, 1).dataset
+    index = dataset.index_of("Open/a")
+    row = dataset.rows[index]
+    assert (row["distance_band"], row["region"], row["room"]) == ("2.0-2.5", "green", "hall")
+    assert dataset.rows[dataset.index_of("Open/b")]["region"] == ""
+    # Optical z is forward, x is right, y is down.
+    assert dataset.cloud(index)[:, 0].min() >= 1
+    assert dataset.cloud(index)[:, 1:].max() <= -1
+
+
+def test_changed_files_are_another_preparation(class_folders: Path, tmp_path: Path) -> None:
+    prepare_dataset(class_folders, tmp_path / "doors", NUM_POINTS, workers=1)
+    (class_folders / "Open" / "b.pcd").unlink()
+    with pytest.raises(ConfigError, match="holds a preparation of something else"):
+        prepare_dataset(class_folders, tmp_path / "doors", NUM_POINTS, workers=1)
+
+
+def test_nothing_that_could_be_prepared_is_an_error_with_the_first_reason(
+    class_folders: Path, tmp_path: Path
+) -> None:
+    with pytest.raises(
+        DatasetError, match="none of the 10 clouds could be prepared; the first: too few points: 600"
+    ):
+        prepare_dataset(class_folders, tmp_path / "doors", 4096, workers=1)
+    assert not (tmp_path / "doors" / DESCRIPTION).exists()
+    assert len(read_csv(tmp_path / "doors" / REJECTED)) == 10

@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Splits: shares, strata, and that nothing of a tested pose can be learned by heart."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.distance import cdist
+
+from doorstate.dataset.splits import draw_splits, read_splits, write_splits
+from doorstate.dataset.strata import distance_band, polar, region
+from doorstate.errors import ConfigError, DatasetError
+from doorstate.simulation.placement import half_ring, reduced_ring
+from doorstate.types import STATES
+
+
+def rows_at(indices: list[int]) -> list[dict[str, str]]:
+    rows = []
+    for index in indices:
+        position = half_ring()[index]
+        distance_m, angle_deg = polar(position.x_m, position.y_m)
+        rows += [
+            {
+                "sample_id": f"p{index}-{state}",
+                "pose_id": f"p{index}",
+                "state": state,
+                "distance_m": str(distance_m),
+                "robot_angle_deg": str(angle_deg),
+                "distance_band": distance_band(distance_m),
+                "region": region(angle_deg),
+            }
+            for state in STATES
+        ]
+    return rows
+
+
+ALL = rows_at(list(range(1353)))
+
+
+@pytest.mark.parametrize("protocol", ["paper", "by-pose"])
+def test_every_sample_has_a_role_and_is_tested_once(protocol: str) -> None:
+    splits = draw_splits(ALL, protocol, 0)
+    assert len(splits) == 5
+    assert all(list(roles) == [row["sample_id"] for row in ALL] for roles in splits)
+    tested = Counter(sample for roles in splits for sample, role in roles.items() if role == "test")
+    assert set(tested.values()) == {1}
+    assert len(tested) == len(ALL)
+
+
+def test_the_papers_folds_are_70_10_20_of_the_whole_and_of_every_stratum() -> None:
+    for roles in draw_splits(ALL, "paper", 0):
+        counts = Counter(roles.values())
+        # 4059 samples are dealt into tenths of 405 or 406.
+        assert counts["test"] in (811, 812)
+        assert counts["val"] in (405, 406)
+        assert counts["train"] == 4059 - counts["test"] - counts["val"]
+        strata = Counter((row["state"], row["distance_band"], row["region"]) for row in ALL)
+        tested = Counter(
+            (row["state"], row["distance_band"], row["region"])
+            for row in ALL
+            if roles[row["sample_id"]] == "test"
+        )
+        assert len(strata) == 60
+        # Two tenths, each within one sample of its share.
+        assert all(abs(tested[name] - size / 5) < 2 for name, size in strata.items())
+
+
+@given(seed=st.integers(0, 2**32 - 1), sizes=st.lists(st.integers(1, 30), min_size=4, max_size=12))
+@settings(deadline=None, max_examples=40)
+def test_any_strata_are_dealt_evenly(seed: int, sizes: list[int]) -> None:
+    rows = [
+        {"sample_id": f"{number}-{k}", "state": STATES[number % 3], "region": str(number)}
+        for number, size in enumerate([*sizes, 30])
+        for k in range(size)
+    ]
+    splits = draw_splits(rows, "paper", seed)
+    for roles in splits:
+        shares = Counter(roles.values())
+        assert abs(shares["val"] - len(rows) / 10) < 1
+        assert abs(shares["test"] - len(rows) / 5) < 2
+        for number, size in enumerate(sizes):
+            tested = sum(roles[f"{number}-{k}"] == "test" for k in range(size))
+            assert abs(tested - size / 5) < 2
+    tested_in_all = [
+        sum(role == "test" for roles in splits for role in [roles[row["sample_id"]]]) for row in rows
+    ]
+    assert tested_in_all == [1] * len(rows)
+
+
+def test_states_of_a_pose_stay_together_and_no_learned_pose_is_near_a_tested_one() -> None:
+    positions = np.array([(p.x_m, p.y_m) for p in half_ring()])
+    apart_m = cdist(positions, positions)
+    for roles in draw_splits(ALL, "by-pose", 0):
+        of_pose = []
+        for index in range(1353):
+            states = {roles[f"p{index}-{state}"] for state in STATES}
+            assert len(states) == 1
+            of_pose.append(states.pop())
+        role = np.array(of_pose)
+        tested, learned = role == "test", np.isin(role, ["train", "val"])
+        nearest_m = apart_m[:, tested].min(axis=1)
+        assert nearest_m[learned].min() > 0.5
+        # Nobody is left out without need, and validation is an eighth of what may be learned from.
+        assert nearest_m[role == "unused"].max() <= 0.5 + 1e-9
+        assert tested.sum() == pytest.approx(1353 / 5, abs=2)
+        assert (role == "val").sum() == pytest.approx(learned.sum() / 8, abs=1)
+        assert {"orange", "red", "green", "yellow", "blue"} > {
+            row["region"] for row in ALL if roles[row["sample_id"]] == "test"
+        }
+
+
+def test_a_fold_by_pose_tests_near_and_far_poses() -> None:
+    for roles in draw_splits(ALL, "by-pose", 0):
+        bands = {row["distance_band"] for row in ALL if roles[row["sample_id"]] == "test"}
+        assert len(bands) == 4
+
+
+@pytest.mark.parametrize("protocol", ["paper", "by-pose"])
+def test_a_seed_draws_the_same_and_another_seed_another(protocol: str) -> None:
+    assert draw_splits(ALL, protocol, 1) == draw_splits(ALL, protocol, 1)
+    assert draw_splits(ALL, protocol, 1) != draw_splits(ALL, protocol, 2)
+
+
+def test_splits_come_back_from_their_file(tmp_path: Path) -> None:
+    splits = draw_splits(rows_at(reduced_ring(60)), "by-pose", 0)
+    assert "unused" in {role for roles in splits for role in roles.values()}
+    write_splits(tmp_path / "splits.csv", splits)
+    assert read_splits(tmp_path / "splits.csv") == splits
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("", "is not a file of splits"),
+        ("sample_id,fold\na,train\n", "is not a file of splits"),
+        ("sample_id,fold_0\n", "is not a file of splits"),
+        ("sample_id,fold_0\na,tset\n", "a has role 'tset' in fold 0"),
+        ("sample_id,fold_0,fold_2\na,train,test\n", "a has role None in fold 1"),
+        ("sample_id,fold_0\na,train,test\n", "line 2 has another number of columns"),
+    ],
+)
+def test_a_damaged_file_of_splits_is_refused(tmp_path: Path, content: str, message: str) -> None:
+    path = tmp_path / "splits.csv"
+    path.write_text(content, encoding="utf-8")
+    with pytest.raises(DatasetError, match=rf"splits\.csv: .*{message}"):
+        read_splits(path)
+
+
+def test_what_cannot_be_split_is_refused() -> None:
+    with pytest.raises(ConfigError, match="no protocol 'by-scene': choose one of paper, by-pose"):
+        draw_splits(ALL, "by-scene", 0)
+    with pytest.raises(DatasetError, match="27 samples are too few for 5 folds: at least 30"):
+        draw_splits(rows_at(list(range(9))), "paper", 0)
+    # Ten neighbours: whichever is tested, all others are too near to learn from.
+    with pytest.raises(DatasetError, match="nothing is left to train"):
+        draw_splits(rows_at(list(range(10))), "by-pose", 0)
+
+
+@pytest.mark.parametrize("missing", ["pose_id", "distance_m", "robot_angle_deg"])
+def test_a_split_by_pose_needs_every_pose(missing: str) -> None:
+    rows = rows_at(reduced_ring(60))
+    for broken in (
+        {name: value for name, value in rows[7].items() if name != missing},
+        rows[7] | {"distance_m": ""},
+    ):
+        with pytest.raises(DatasetError, match=rf"{rows[7]['sample_id']} has none \(prepare with --poses\)"):
+            draw_splits([*rows[:7], broken, *rows[8:]], "by-pose", 0)
