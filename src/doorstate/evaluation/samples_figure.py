@@ -44,7 +44,7 @@ def samples_figure(dataset: PreparedDataset) -> Figure:
             picture = pictures[index]
             if picture is not None:
                 axes[first, column].imshow(picture[::2, ::2], interpolation="none")
-            _draw_cloud(axes[first + lines_per_state - 1, column], dataset, index)
+            draw_cloud(axes[first + lines_per_state - 1, column], dataset, index)
     for column, region in enumerate(regions):
         if region:
             low, high = REGIONS[region]
@@ -93,7 +93,8 @@ def _shown_parts(dataset: PreparedDataset, index: int) -> NDArray[np.uint8]:
     return np.empty(0, np.uint8) if parts is None else parts[:_SHOWN_POINTS]
 
 
-def _draw_cloud(axis: Axes, dataset: PreparedDataset, index: int) -> None:
+def draw_cloud(axis: Axes, dataset: PreparedDataset, index: int) -> None:
+    """Draw a sample's cloud, seen from above and beside, with its opening angle and distance below."""
     points, parts, row = (
         dataset.cloud(index)[:_SHOWN_POINTS],
         _shown_parts(dataset, index),

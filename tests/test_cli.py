@@ -1,0 +1,308 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The command line as a user meets it: answers, errors of one line, exit codes."""
+
+from __future__ import annotations
+
+import csv
+import json
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import doorstate
+from doorstate.cli import main
+from doorstate.clouds.pcd import write_pcd
+from doorstate.dataset.store import PreparedDataset
+from doorstate.networks import create_network, list_networks
+from doorstate.training.weights import WeightsCard, save_weights
+
+Run = Callable[..., tuple[int, str, str]]
+REAL = Path(__file__).resolve().parents[1].parent / "shared" / "real"
+COMMANDS = ("simulate", "prepare", "train", "compare", "report", "predict", "info")
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Run:
+    """Run the command in this process: exit code, standard output, standard error."""
+
+    def call(*arguments: object) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["doorstate", *map(str, arguments)])
+        code = 0
+        try:
+            main()
+        except SystemExit as end:
+            if isinstance(end.code, str):
+                print(end.code, file=sys.stderr)
+            code = 1 if isinstance(end.code, str) else end.code or 0
+        captured = capsys.readouterr()
+        return code, captured.out, captured.err
+
+    return call
+
+
+@pytest.fixture(scope="session")
+def weights(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An untrained PointNet: quick, and any answer will do."""
+    path = tmp_path_factory.mktemp("weights") / "pointnet.safetensors"
+    save_weights(path, create_network("pointnet"), WeightsCard(network="pointnet", num_points=256))
+    return path
+
+
+@pytest.fixture
+def cloud() -> np.ndarray:
+    rng = np.random.default_rng(0)
+    return np.stack([rng.uniform(1, 3, 500), rng.uniform(-1, 1, 500), rng.uniform(-1, 1, 500)], 1).astype(
+        np.float32
+    )
+
+
+def test_help_is_quick_because_it_imports_nothing_heavy() -> None:
+    heavy = ("torch", "numpy", "scipy", "sklearn", "pydantic", "matplotlib", "plotly", "lightning_fabric")
+    script = f"import sys, doorstate.cli; print([name for name in {heavy} if name in sys.modules])"
+    assert subprocess.check_output([sys.executable, "-c", script], text=True).strip() == "[]"
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_shows_examples(command: str, run: Run) -> None:
+    code, out, _ = run(command, "--help")
+    assert code == 0
+    assert f"doorstate {command}" in out.partition("Examples:")[2].partition("Options:")[0]
+
+
+def test_help_lists_the_commands(run: Run) -> None:
+    code, out, _ = run("--help")
+    assert code == 0
+    assert all(f"\n  {command} " in out for command in COMMANDS)
+
+
+def test_wrong_usage_is_exit_code_2(run: Run) -> None:
+    assert run("predict", "--nonsense", "x")[0] == 2
+    assert run("predct")[0] == 2
+
+
+def test_info_names_versions_and_networks(run: Run) -> None:
+    code, out, _ = run("info", "--json")
+    found = json.loads(out)
+    assert code == 0
+    assert found["doorstate"] == doorstate.__version__
+    assert [entry["network"] for entry in found["networks"]] == list_networks()
+    assert {entry["parameters"] for entry in found["networks"]} >= {3_470_540, 1_466_179}
+    assert run("info")[0] == 0
+
+
+def test_predict_prints_a_table(run: Run, weights: Path, cloud: np.ndarray, tmp_path: Path) -> None:
+    np.save(tmp_path / "a.npy", cloud)
+    write_pcd(tmp_path / "b.pcd", cloud)
+    code, out, err = run("predict", tmp_path, "--weights", weights)
+    assert code == 0
+    assert "a.npy" in out
+    assert "b.pcd" in out
+    assert err == ""
+
+
+def test_predict_json_is_one_object_a_line(
+    run: Run, weights: Path, cloud: np.ndarray, tmp_path: Path
+) -> None:
+    np.save(tmp_path / "a.npy", cloud)
+    (tmp_path / "b.npy").write_bytes(b"garbage")
+    np.save(tmp_path / "c.npy", cloud[:200])
+    code, out, _ = run("predict", tmp_path, "--weights", weights, "--json")
+    answers = [json.loads(line) for line in out.splitlines()]
+    assert code == 1, "a file could not be answered"
+    assert [Path(answer["file"]).name for answer in answers] == ["a.npy", "b.npy", "c.npy"], "the others are"
+    good, bad, few = answers
+    assert good["state"] in ("closed", "semi_open", "open")
+    assert sum(good["probabilities"].values()) == pytest.approx(1, abs=1e-5)
+    assert good["state"] == max(good["probabilities"], key=good["probabilities"].__getitem__)
+    assert (good["points"], few["points"]) == (256, 200)
+    assert good["milliseconds"] > 0
+    assert set(bad) == {"file", "error"}
+
+
+def broken(kind: str, cloud: np.ndarray) -> np.ndarray:
+    return {
+        "empty": cloud[:0],
+        "all NaN": cloud * np.nan,
+        "too few": cloud[:20],
+        "millimetres": cloud * 1000,
+    }[kind]
+
+
+@pytest.mark.parametrize(
+    ("kind", "complaint"),
+    [("empty", "empty"), ("all NaN", "NaN"), ("too few", "too few points"), ("millimetres", "millimetres?")],
+)
+def test_a_cloud_without_a_door_to_see_is_one_line(
+    kind: str, complaint: str, run: Run, weights: Path, cloud: np.ndarray, tmp_path: Path
+) -> None:
+    np.save(tmp_path / "bad.npy", broken(kind, cloud))
+    np.save(tmp_path / "good.npy", cloud)
+    code, out, err = run("predict", tmp_path / "bad.npy", tmp_path / "good.npy", "--weights", weights)
+    assert code == 1
+    assert "good.npy" in out
+    first = err.splitlines()[0]
+    assert "bad.npy" in first
+    assert complaint in first
+
+
+def test_units_are_taken(run: Run, weights: Path, cloud: np.ndarray, tmp_path: Path) -> None:
+    np.save(tmp_path / "m.npy", cloud)
+    np.save(tmp_path / "mm.npy", cloud * 1000)
+    _, metres, _ = run("predict", tmp_path / "m.npy", "--weights", weights, "--json")
+    code, millimetres, _ = run(
+        "predict", tmp_path / "mm.npy", "--weights", weights, "--json", "--units", "mm"
+    )
+    assert code == 0
+    a, b = (json.loads(text)["probabilities"] for text in (metres, millimetres))
+    assert a == pytest.approx(b, abs=1e-3)
+
+
+def test_depth_images_need_and_take_a_camera(run: Run, weights: Path, tmp_path: Path) -> None:
+    depth = np.random.default_rng(0).integers(1000, 3000, (30, 40), dtype=np.uint16)
+    Image.fromarray(depth).save(tmp_path / "d.png")
+    code, _, err = run("predict", tmp_path / "d.png", "--weights", weights)
+    assert code == 1
+    assert "--intrinsics" in err
+    flags = ("--fx", 30, "--fy", 30, "--cx", 19.5, "--cy", 14.5)
+    code, by_flags, _ = run("predict", tmp_path / "d.png", "--weights", weights, "--json", *flags)
+    assert code == 0
+    camera = {"width": 40, "height": 30, "fx": 30, "fy": 30, "cx": 19.5, "cy": 14.5}
+    (tmp_path / "camera.json").write_text(json.dumps(camera))
+    (tmp_path / "camera.yaml").write_text(
+        "image_width: 40\nimage_height: 30\ncamera_matrix: {data: [30, 0, 19.5, 0, 30, 14.5, 0, 0, 1]}\n"
+    )
+    for name in ("camera.json", "camera.yaml"):
+        code, out, _ = run(
+            "predict", tmp_path / "d.png", "--weights", weights, "--json", "--intrinsics", tmp_path / name
+        )
+        assert code == 0
+        assert json.loads(out)["probabilities"] == json.loads(by_flags)["probabilities"]
+    assert "all four" in run("predict", tmp_path / "d.png", "--weights", weights, "--fx", 30)[2]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (["predict", "gone.pcd"], "gone.pcd"),
+        (["predict", ".", "--units", "furlongs"], "--units furlongs"),
+        (["predict", ".", "--frame", "sideways"], "sideways"),
+        (["predict", ".", "--network", "pointnett"], "pointnett"),
+        (["predict", ".", "--weights", "gone.safetensors"], "no such weights file"),
+        (["simulate", "--out", "x", "--preset", "mars"], "no preset 'mars'"),
+        (["simulate", "--out", "x", "--poses", "9999"], "1353"),
+        (["simulate", "--out", "x", "--keep", "video"], "pcd, depth, image"),
+        (["prepare", "gone", "--out", "x"], "gone"),
+        (["train", "pointnet", "--data", "gone", "--out", "x"], "gone"),
+        (["train", "poinnet", "--data", "gone", "--out", "x"], "did you mean 'pointnet'"),
+        (["compare", "gone.toml"], "gone.toml"),
+        (["compare", "--data", "gone", "--set", "epochs"], "FIELD=VALUE"),
+        (["report", "gone"], "gone"),
+    ],
+)
+def test_errors_are_one_line_and_exit_code_1(
+    arguments: list[str],
+    complaint: str,
+    run: Run,
+    tmp_path: Path,
+    cloud: np.ndarray,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    np.save("cloud.npy", cloud)
+    code, _, err = run(*arguments)
+    assert code == 1
+    assert len(err.strip().splitlines()) == 1
+    assert err.startswith("doorstate: ")
+    assert complaint in err
+
+
+def test_a_stop_by_the_user_is_exit_code_130(
+    run: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    def stopped(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("doorstate.simulation.run.simulate_dataset", stopped)
+    code, _, err = run("simulate", "--out", tmp_path / "x", "--poses", 1)
+    # typer turns the key into exit code 130 by itself in some versions.
+    assert code == 130
+    assert "Traceback" not in err
+
+
+def test_the_pipeline_from_nothing_to_a_report(run: Run, tmp_path: Path) -> None:
+    simulated, clouds, runs = tmp_path / "simulated", tmp_path / "clouds", tmp_path / "runs"
+    assert run("simulate", "--out", simulated, "--poses", 12, "--keep", "depth", "--workers", 1)[0] == 0
+    assert run("prepare", simulated, "--out", clouds, "--points", 128, "--workers", 1)[0] == 0
+    code, out, err = run(
+        *("compare", "--data", clouds, "--out", runs, "--networks", "pointnet,pointnet2", "--folds", 1),
+        *("--points", 128, "--epochs", 1, "--set", "batch_size=8", "--set", "precision=fp32"),
+    )
+    assert code == 0, err
+    assert "pointnet2" in out
+    code, out, err = run("report", runs)
+    assert code == 0, err
+    assert (runs / "report" / "report.html").is_file()
+    assert run("report", clouds, "--out", tmp_path / "data-report")[0] == 0
+    trained = runs / "runs" / "pointnet2" / "fold0" / "weights.safetensors"
+    depth = sorted((simulated / "depth" / "open").glob("*.png"))[0]
+    camera = ("--fx", 554.256258, "--fy", 554.256258, "--cx", 319.5, "--cy", 239.5)
+    code, out, _ = run("predict", depth, "--weights", trained, "--json", *camera)
+    assert code == 0
+    assert json.loads(out)["points"] == 128
+
+
+def test_train_makes_one_run(run: Run, small_dataset: PreparedDataset, tmp_path: Path) -> None:
+    arguments = (
+        "--points",
+        128,
+        "--epochs",
+        1,
+        "--set",
+        "batch_size=8",
+        "--set",
+        "precision=fp32",
+        "--fold",
+        1,
+    )
+    code, out, err = run(
+        "train", "pointcnn", "--data", small_dataset.folder, "--out", tmp_path / "run", *arguments
+    )
+    assert code == 0, err
+    assert "test macro-F1" in out
+    assert (tmp_path / "run" / "weights.safetensors").is_file()
+
+
+def test_prepare_takes_class_folders(run: Run, simulated_folder: Path, tmp_path: Path) -> None:
+    pcd = simulated_folder / "pcd"
+    code, out, _ = run("prepare", pcd, "--out", tmp_path / "clouds", "--points", 128, "--workers", 1)
+    assert code == 0
+    assert out.startswith("36 clouds of 128 points")
+
+
+def recorded() -> Iterator[dict[str, str]]:
+    if (REAL / "index.csv").is_file():
+        with (REAL / "index.csv").open(newline="") as stream:
+            yield from (row for row in csv.DictReader(stream) if row["fx"] != "?")
+
+
+@pytest.mark.skipif(not REAL.is_dir(), reason="the recorded frames are not here")
+def test_recorded_frames_are_answered(run: Run, weights: Path) -> None:
+    answered = 0
+    for row in recorded():
+        flags = [item for name in ("fx", "fy", "cx", "cy") if row[name] for item in (f"--{name}", row[name])]
+        scale = ["--depth-scale", row["depth_unit_m"]] if row["depth_unit_m"] else []
+        code, out, _ = run("predict", REAL / row["file"], "--weights", weights, "--json", *flags, *scale)
+        answer = json.loads(out)
+        if "8bit" in row["file"]:
+            assert code == 1
+            assert "8-bit" in answer["error"]
+        else:
+            assert code == 0
+            assert answer["points"] == 256
+            answered += 1
+    assert answered >= 20
