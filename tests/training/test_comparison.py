@@ -74,7 +74,9 @@ def test_a_missing_experiment_is_named(tmp_path: Path) -> None:
         load_experiment(tmp_path / "gone.toml", {})
 
 
-@pytest.mark.parametrize("path", sorted(Path(__file__).parents[2].glob("experiments/*.toml")), ids=lambda p: p.name)
+@pytest.mark.parametrize(
+    "path", sorted(Path(__file__).parents[2].glob("experiments/*.toml")), ids=lambda p: p.name
+)
 def test_the_experiments_of_the_repository_are_valid(path: Path) -> None:
     assert load_experiment(path, {}).name == path.stem
 
@@ -87,7 +89,9 @@ def test_the_split_is_drawn_once(small_dataset: PreparedDataset, tmp_path: Path)
     assert len(read_splits(tmp_path / "c" / "splits.csv")) == 5
 
 
-def test_another_comparison_in_the_same_folder_is_refused(small_dataset: PreparedDataset, tmp_path: Path) -> None:
+def test_another_comparison_in_the_same_folder_is_refused(
+    small_dataset: PreparedDataset, tmp_path: Path
+) -> None:
     prepare_comparison(experiment(small_dataset), tmp_path / "c")
     with pytest.raises(RunError, match="another seed; choose another folder"):
         prepare_comparison(experiment(small_dataset, seed=1), tmp_path / "c")
@@ -130,7 +134,9 @@ if __name__ == "__main__":
 
 @pytest.mark.slow
 @pytest.mark.parametrize("jobs", [1, 2])
-def test_killed_and_restarted_it_ends_the_same(jobs: int, small_dataset: PreparedDataset, tmp_path: Path) -> None:
+def test_killed_and_restarted_it_ends_the_same(
+    jobs: int, small_dataset: PreparedDataset, tmp_path: Path
+) -> None:
     settings = experiment(small_dataset)
     write(tmp_path / "experiment.json", settings.model_dump_json())
     script = write(tmp_path / "script.py", SCRIPT)

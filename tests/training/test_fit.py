@@ -74,10 +74,15 @@ def test_a_run_leaves_everything_needed_to_judge_it(finished: Path, roles: dict[
         "weights.safetensors",
     ]
     predictions = read_csv(finished / "predictions.csv")
-    assert {row["sample_id"] for row in predictions} == {name for name, role in roles.items() if role == "test"}
+    assert {row["sample_id"] for row in predictions} == {
+        name for name, role in roles.items() if role == "test"
+    }
     metrics = json.loads((finished / "metrics.json").read_text())
     oracle = f1_score(
-        [row["state"] for row in predictions], [row["predicted"] for row in predictions], average="macro", zero_division=0
+        [row["state"] for row in predictions],
+        [row["predicted"] for row in predictions],
+        average="macro",
+        zero_division=0,
     )
     assert metrics["test_macro_f1"] == pytest.approx(oracle)
     log = read_csv(finished / "log.csv")
@@ -178,7 +183,9 @@ def test_only_full_resolution_may_be_the_best_epoch(
 def test_a_loss_that_is_no_number_stops_the_run(
     small_dataset: PreparedDataset, roles: dict[str, Role], tmp_path: Path
 ) -> None:
-    recipe = RECIPE.model_copy(update={"optimizer": "sgd", "learning_rate": 1e30, "gradient_clip": None, "warmup": 0.01})
+    recipe = RECIPE.model_copy(
+        update={"optimizer": "sgd", "learning_rate": 1e30, "gradient_clip": None, "warmup": 0.01}
+    )
     with pytest.raises(RunError, match="try a lower learning rate"):
         fit(config(recipe=recipe, network="dgcnn"), small_dataset, roles, tmp_path / "run")
 

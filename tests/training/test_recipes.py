@@ -37,7 +37,9 @@ def test_an_unknown_recipe_is_named(name: str) -> None:
         find_recipe(name, "pointnet")
 
 
-@pytest.mark.parametrize(("epoch", "rate"), [(0, 1e-3), (19, 1e-3), (20, 7e-4), (40, 4.9e-4), (249, 1e-3 * 0.7**12)])
+@pytest.mark.parametrize(
+    ("epoch", "rate"), [(0, 1e-3), (19, 1e-3), (20, 7e-4), (40, 4.9e-4), (249, 1e-3 * 0.7**12)]
+)
 def test_pointnet_rate_falls_every_20_epochs(epoch: int, rate: float) -> None:
     assert learning_rate(AUTHORS["pointnet"], epoch * PER_EPOCH, PER_EPOCH) == pytest.approx(rate)
 
@@ -56,7 +58,9 @@ def test_batchnorm_momentum_halves_to_its_floor() -> None:
 
 def test_pointcnn_rate_halves_at_iteration_8000() -> None:
     recipe = AUTHORS["pointcnn"]
-    assert [learning_rate(recipe, i, 77) for i in (0, 7999, 8000, 16000)] == pytest.approx([0.01, 0.01, 0.005, 0.0025])
+    assert [learning_rate(recipe, i, 77) for i in (0, 7999, 8000, 16000)] == pytest.approx(
+        [0.01, 0.01, 0.005, 0.0025]
+    )
     # 1024 epochs of 77 iterations end at 1.95e-5.
     assert learning_rate(recipe, 1024 * 77 - 1, 77) == pytest.approx(1.953e-5, rel=1e-3)
 
@@ -78,7 +82,9 @@ def test_one_cycle_rises_to_its_rate_and_falls_to_nearly_nothing() -> None:
     assert rates[-1] < 1e-3
 
 
-@given(iteration=st.integers(0, 10**6), per_epoch=st.integers(1, 1000), network=st.sampled_from(sorted(AUTHORS)))
+@given(
+    iteration=st.integers(0, 10**6), per_epoch=st.integers(1, 1000), network=st.sampled_from(sorted(AUTHORS))
+)
 @settings(deadline=None, max_examples=200)
 def test_rates_stay_within_their_bounds(iteration: int, per_epoch: int, network: str) -> None:
     recipe = AUTHORS[network]
@@ -87,7 +93,9 @@ def test_rates_stay_within_their_bounds(iteration: int, per_epoch: int, network:
 
 
 def test_coarse_to_fine_ends_on_all_points() -> None:
-    recipe = Recipe(name="x", epochs=10, coarse_to_fine=(Stage(share=0.3, points=256), Stage(share=0.4, points=1024)))
+    recipe = Recipe(
+        name="x", epochs=10, coarse_to_fine=(Stage(share=0.3, points=256), Stage(share=0.4, points=1024))
+    )
     points = [points_of_epoch(recipe, epoch, 4096) for epoch in range(10)]
     assert points == [256] * 3 + [1024] * 4 + [4096] * 3
     assert points_of_epoch(recipe, 5, 512) == 512, "never more points than the run has"

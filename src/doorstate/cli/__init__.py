@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The command `doorstate`: parse, call, print; the only catcher of our own exceptions.
+
+Heavy imports happen inside the commands, so that `--help` answers at once.
+Exit codes: 0 all well, 1 something could not be done (said in one line), 2 wrong usage, 130 stopped by the user.
+"""
+
+from __future__ import annotations
+
+import logging
+import sys
+
+import typer
+
+from doorstate.cli.answers import info, predict
+from doorstate.cli.data import prepare, simulate
+from doorstate.cli.training import compare, report, train
+from doorstate.errors import DoorstateError
+
+app = typer.Typer(
+    name="doorstate",
+    help="The state of a door (open, semi-open, closed) from one depth-camera point cloud.",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
+)
+for command in (simulate, prepare, train, compare, report, predict, info):
+    app.command()(command)
+
+
+def main() -> None:
+    """Run the command line; our own exceptions become one line on standard error."""
+    logging.getLogger("lightning_fabric").setLevel(logging.WARNING)
+    try:
+        app()
+    except DoorstateError as error:
+        sys.exit(f"doorstate: {error}")
+    except KeyboardInterrupt:
+        print("doorstate: stopped; the same command goes on from here", file=sys.stderr)  # noqa: T201
+        sys.exit(130)

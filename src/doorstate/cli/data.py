@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Commands that make data sets."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from doorstate.cli.options import DepthScale, Focal, Frame, IntrinsicsFile, Roll, Units, Workers, read_options
+from doorstate.errors import ConfigError
+
+
+def simulate(
+    out: Annotated[Path, typer.Option(help="Folder to make, or to go on with.")],
+    preset: Annotated[str, typer.Option(help="ogurob, ogurob-fixed or ogurob-away.")] = "ogurob",
+    poses: Annotated[
+        int | None, typer.Option(help="How many of the 1353 robot poses; all if not given.")
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Everything random is drawn from it.", min=0)] = 0,
+    keep: Annotated[
+        list[str] | None, typer.Option(help="Raw files to keep: pcd, depth, image; repeatable.")
+    ] = None,
+    workers: Workers = None,
+) -> None:
+    """Simulate doors seen by a depth camera: a manifest whose every row rebuilds its cloud.
+
+    \b
+    Examples:
+      doorstate simulate --out data/ogurob
+      doorstate simulate --out data/small --poses 60 --keep pcd --keep image
+    """
+    from doorstate.console import err, print_table, progress_bar
+    from doorstate.console import out as stdout
+    from doorstate.dataset.strata import BANDS, REGIONS, distance_band, region
+    from doorstate.simulation.generate import find_preset
+    from doorstate.simulation.run import RAW_KINDS, SimulationSettings, simulate_dataset
+
+    unknown = [kind for kind in keep or [] if kind not in RAW_KINDS]
+    if unknown:
+        raise ConfigError(f"--keep {unknown[0]}: choose from {', '.join(RAW_KINDS)}")
+    kinds: Any = tuple(kind for kind in RAW_KINDS if kind in (keep or []))
+    settings = SimulationSettings(preset=find_preset(preset), seed=seed, poses=poses, raw=kinds)
+    with progress_bar("Simulating") as progress:
+        rows = simulate_dataset(out, settings, workers, progress)
+    counts = [
+        (distance_band(float(row["distance_m"])), region(float(row["robot_angle_deg"]))) for row in rows
+    ]
+    print_table(
+        "Clouds by distance (m) and angle region (Table 1; a third of each per state)",
+        ["distance", *REGIONS, "all"],
+        [
+            [
+                band,
+                *(str(counts.count((band, name))) for name in REGIONS),
+                str(sum(c[0] == band for c in counts)),
+            ]
+            for band in BANDS
+        ],
+    )
+    twins = sum(bool(row["same_image_as"]) for row in rows)
+    if twins:
+        err.print(
+            f"{twins} frames look the same in another state: nobody can tell them apart (same_image_as)"
+        )
+    stdout.print(f"{len(rows)} samples in {out}; next: doorstate prepare {out} --out {out}-4096")
+
+
+def prepare(
+    source: Annotated[Path, typer.Argument(help="A simulated folder, or class folders of clouds.")],
+    out: Annotated[Path, typer.Option(help="Folder to make, or to go on with.")],
+    points: Annotated[int, typer.Option(help="Points kept of every cloud.", min=128)] = 4096,
+    poses: Annotated[
+        Path | None,
+        typer.Option(help="CSV of poses for class folders: file,x_m,y_m or file,distance_m,robot_angle_deg."),
+    ] = None,
+    frame: Frame = "body",
+    roll: Roll = 0,
+    units: Units = "m",
+    depth_scale: DepthScale = 0.001,
+    intrinsics: IntrinsicsFile = None,
+    fx: Focal = None,
+    fy: Focal = None,
+    cx: Focal = None,
+    cy: Focal = None,
+    workers: Workers = None,
+) -> None:
+    """Clean clouds and bring them into farthest-point order, ready for training.
+
+    \b
+    Examples:
+      doorstate prepare data/ogurob --out data/ogurob-4096
+      doorstate prepare ~/OGUROB_DOORS --poses poses.csv --frame optical --out data/original
+    """
+    from doorstate.console import err, progress_bar
+    from doorstate.console import out as stdout
+    from doorstate.dataset.prepare import prepare_dataset
+
+    options = read_options(frame, roll, units, depth_scale, intrinsics, (fx, fy, cx, cy))
+    with progress_bar("Preparing") as progress:
+        summary = prepare_dataset(source, out, points, poses, options, workers, progress)
+    for row in summary.rejected[:10]:
+        err.print(f"left out {row['file'] or row['sample_id']}: {row['reason']}", markup=False)
+    if summary.rejected:
+        err.print(f"{len(summary.rejected)} clouds left out, all in {out / 'rejected.csv'}")
+    stdout.print(f"{len(summary.dataset)} clouds of {points} points in {out}")
+    if summary.rejected:
+        raise typer.Exit(1)

@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Options that several commands share, and what they mean to the library."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from doorstate.errors import ConfigError
+
+if TYPE_CHECKING:
+    from doorstate.clouds.io import ReadOptions
+
+# What a cloud file does not say about itself: the same options for `predict` and `prepare`.
+Frame = Annotated[
+    str,
+    typer.Option(help="Frame of cloud files: body (x forward, y left, z up) or optical (z forward, y down)."),
+]
+Roll = Annotated[
+    int, typer.Option(help="How far the camera was turned clockwise, seen from behind: 0, 90, 180, 270.")
+]
+Units = Annotated[str, typer.Option(help="Unit of cloud files: m, dm, cm, mm or km.")]
+DepthScale = Annotated[float, typer.Option(help="Metres per unit of depth images.")]
+IntrinsicsFile = Annotated[
+    Path | None, typer.Option("--intrinsics", help="Camera of depth images: JSON or ROS camera_info YAML.")
+]
+Focal = Annotated[
+    float | None, typer.Option(help="Focal length or centre in pixels, in place of --intrinsics.")
+]
+Workers = Annotated[int | None, typer.Option(help="Processes; all processors if not given.", min=1)]
+Changes = Annotated[
+    list[str] | None,
+    typer.Option("--set", help="A field of the recipe, such as --set batch_size=32; repeatable."),
+]
+UNITS_M = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "km": 1000.0}
+
+
+def read_options(
+    frame: str,
+    roll: int,
+    units: str,
+    depth_scale: float,
+    intrinsics_file: Path | None,
+    flags: tuple[float | None, float | None, float | None, float | None],
+) -> ReadOptions:
+    """What the options say of cloud files; one error line for what does not fit together."""
+    from doorstate.clouds.camera import Intrinsics, Pinhole, read_intrinsics
+    from doorstate.clouds.io import ReadOptions
+
+    if units not in UNITS_M:
+        raise ConfigError(f"--units {units}: choose one of {', '.join(UNITS_M)}")
+    intrinsics: Intrinsics | Pinhole | None = None
+    if intrinsics_file is not None:
+        intrinsics = read_intrinsics(intrinsics_file)
+    elif any(value is not None for value in flags):
+        fx, fy, cx, cy = flags
+        if fx is None or fy is None or cx is None or cy is None:
+            raise ConfigError("--fx, --fy, --cx and --cy belong together: give all four")
+        intrinsics = Pinhole(fx, fy, cx, cy)
+    return ReadOptions(frame, roll, intrinsics, depth_scale, UNITS_M[units])  # type: ignore[arg-type]
+
+
+def recipe_changes(settings: list[str] | None, epochs: int | None) -> dict[str, Any]:
+    """Fields of the recipe given as FIELD=VALUE, values as in TOML; a bare word is a string."""
+    changes: dict[str, Any] = {} if epochs is None else {"epochs": epochs}
+    for setting in settings or []:
+        name, equals, value = setting.partition("=")
+        if not equals:
+            raise ConfigError(f"--set {setting}: write it as FIELD=VALUE")
+        try:
+            changes[name.strip()] = tomllib.loads(f"value = {value}")["value"]
+        except tomllib.TOMLDecodeError:
+            changes[name.strip()] = value.strip()
+    return changes

@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Commands that train, compare and report."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from doorstate.cli.options import Changes, recipe_changes
+
+
+def train(
+    network: Annotated[str, typer.Argument(help="pointnet, pointnet2, dgcnn, pointcnn or point2sequence.")],
+    data: Annotated[Path, typer.Option(help="A prepared data set.")],
+    out: Annotated[Path, typer.Option(help="Folder of the run; a begun run goes on.")],
+    fold: Annotated[int, typer.Option(help="Which of the five folds is tested.", min=0, max=4)] = 0,
+    protocol: Annotated[str, typer.Option(help="paper or by-pose.")] = "paper",
+    points: Annotated[int, typer.Option(help="Points of every cloud.", min=128)] = 4096,
+    seed: Annotated[int, typer.Option(min=0)] = 0,
+    recipe: Annotated[str, typer.Option(help="common or authors.")] = "common",
+    epochs: Annotated[int | None, typer.Option(help="In place of the recipe's.", min=1)] = None,
+    changes: Changes = None,
+) -> None:
+    """Train one network on one fold: weights, predictions and metrics in one folder.
+
+    \b
+    Examples:
+      doorstate train pointnet2 --data data/ogurob-4096 --points 1024 --epochs 12 --out runs/first
+      doorstate train dgcnn --data data/ogurob-4096 --recipe authors --set batch_size=16 --out runs/dgcnn
+    """
+    from doorstate.console import live_runs
+    from doorstate.console import out as stdout
+    from doorstate.dataset.splits import draw_splits, write_splits
+    from doorstate.dataset.store import open_dataset
+    from doorstate.training.comparison import Run, load_experiment, train_one
+    from doorstate.training.run_folder import RunFolder
+
+    overrides = {
+        "name": out.name,
+        "dataset": str(data),
+        "protocol": protocol,
+        "networks": (network,),
+        "num_points": points,
+        "seed": seed,
+        "recipe": recipe,
+        "recipe_changes": recipe_changes(changes, epochs),
+    }
+    experiment = load_experiment(None, overrides)
+    dataset = open_dataset(data)
+    splits = out / "splits.csv"
+    if not splits.is_file():
+        write_splits(splits, draw_splits(dataset.rows, protocol, seed))
+    runs = [Run(network, fold, RunFolder(out))]
+    with live_runs(runs, {network: experiment.recipe_of(network).epochs}, 1):
+        metrics = train_one(experiment, out, dataset, network, fold, splits)
+    stdout.print(
+        f"{network}, fold {fold}: test macro-F1 {metrics['test_macro_f1']:.4f}, accuracy {metrics['test_accuracy']:.4f}"
+        f" on {metrics['test_samples']} clouds; weights in {out / 'weights.safetensors'}"
+    )
+
+
+def compare(
+    experiment: Annotated[
+        Path | None, typer.Argument(help="An experiment file; options win over it.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder of the comparison; runs/NAME if not given.")
+    ] = None,
+    data: Annotated[Path | None, typer.Option(help="A prepared data set.")] = None,
+    protocol: Annotated[str | None, typer.Option(help="paper or by-pose.")] = None,
+    networks: Annotated[
+        str | None, typer.Option(help="Names, separated by commas; all five if not given.")
+    ] = None,
+    folds: Annotated[
+        int | None, typer.Option(help="How many of the five folds to run.", min=1, max=5)
+    ] = None,
+    points: Annotated[int | None, typer.Option(help="Points of every cloud.", min=128)] = None,
+    seed: Annotated[int | None, typer.Option(min=0)] = None,
+    recipe: Annotated[str | None, typer.Option(help="common or authors.")] = None,
+    epochs: Annotated[int | None, typer.Option(help="In place of the recipe's.", min=1)] = None,
+    changes: Changes = None,
+    jobs: Annotated[int, typer.Option(help="Runs at the same time.", min=1)] = 1,
+) -> None:
+    """Cross-validate networks on one split; stopped at any moment, it goes on where it was.
+
+    \b
+    Examples:
+      doorstate compare experiments/one-fold.toml
+      doorstate compare --data data/ogurob-4096 --protocol by-pose --networks pointnet,dgcnn --out runs/two
+    """
+    from doorstate.console import live_runs, print_table
+    from doorstate.training.comparison import compare as run_comparison
+    from doorstate.training.comparison import load_experiment, runs_of
+
+    given: dict[str, Any] = {
+        "dataset": None if data is None else str(data),
+        "protocol": protocol,
+        "networks": None if networks is None else tuple(name.strip() for name in networks.split(",")),
+        "folds": folds,
+        "num_points": points,
+        "seed": seed,
+        "recipe": recipe,
+    }
+    overrides = {key: value for key, value in given.items() if value is not None}
+    if experiment is None:
+        overrides.setdefault("name", out.name if out else "comparison")
+    settings = load_experiment(experiment, overrides | {"recipe_changes": recipe_changes(changes, epochs)})
+    folder = out or Path("runs") / settings.name
+    runs = runs_of(settings, folder)
+    planned = {network: settings.recipe_of(network).epochs for network in settings.networks}
+    with live_runs(runs, planned, jobs) as progress:
+        metrics = run_comparison(settings, folder, jobs, progress)
+    print_table(
+        f"{settings.name}: macro-F1 on the test folds (protocol {settings.protocol}, {settings.num_points} points)",
+        ["network", *(f"fold {fold}" for fold in range(settings.folds)), "mean"],
+        [_score_row(network, metrics) for network in settings.networks],
+    )
+    from doorstate.console import out as stdout
+
+    stdout.print(f"next: doorstate report {folder}")
+
+
+def report(
+    folder: Annotated[Path, typer.Argument(help="A comparison, or a prepared data set.")],
+    out: Annotated[Path | None, typer.Option(help="Folder to write to; FOLDER/report if not given.")] = None,
+) -> None:
+    """Write tables, figures and one self-contained HTML page; of a data set, Table 1 and Figures 1 and 2.
+
+    \b
+    Examples:
+      doorstate report runs/one-fold
+      doorstate report data/ogurob-4096 --out reports/data
+    """
+    from doorstate.console import err
+    from doorstate.console import out as stdout
+    from doorstate.evaluation.report import write_dataset_figures, write_everything
+
+    target = out or folder / "report"
+    with err.status("Writing the report"):
+        if (folder / "comparison.json").is_file():
+            page = write_everything(folder, target)
+        else:
+            page = write_dataset_figures(folder, target)
+    stdout.print(f"report: {page}", soft_wrap=True)
+
+
+def _score_row(network: str, metrics: list[dict[str, Any]]) -> list[str]:
+    scores = [run["test_macro_f1"] for run in metrics if run["network"] == network]
+    return [network, *(f"{score:.4f}" for score in scores), f"{sum(scores) / len(scores):.4f}"]
