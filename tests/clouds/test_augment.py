@@ -70,7 +70,11 @@ def test_a_tilt_is_small_and_a_rotation() -> None:
     linear = linear_of(Augmentation(tilt_deg=2), clouds=3000).astype(np.float64)
     np.testing.assert_allclose(np.linalg.det(linear), 1, atol=1e-6)
     up_deg = np.degrees(np.arccos(np.clip(linear[:, 2, 2], -1, 1)))
-    assert up_deg.max() <= 6 * math.sqrt(2) + 0.01  # cut at three sigma about each axis
+    # R_x(a) R_y(b) takes up to (sin b, -sin a cos b, cos a cos b); both are cut at three sigma.
+    about_y = np.degrees(np.arcsin(linear[:, 0, 2]))
+    about_x = np.degrees(np.arctan2(-linear[:, 1, 2], linear[:, 2, 2]))
+    assert np.abs(about_x).max() == pytest.approx(6, abs=1e-3)
+    assert np.abs(about_y).max() == pytest.approx(6, abs=1e-3)
     # The tilt about two axes of sigma 2 degrees is Rayleigh distributed: its mean is 2 sqrt(pi / 2).
     assert up_deg.mean() == pytest.approx(2 * math.sqrt(math.pi / 2), rel=0.05)
 

@@ -149,6 +149,28 @@ def test_both_forms_give_the_same_indices(points: Points) -> None:
     np.testing.assert_array_equal(fpsample_indices(points, count), numpy_indices(points, count))
 
 
+def test_both_forms_split_their_trees_alike_where_points_lie_on_the_mean() -> None:
+    pytest.importorskip("fpsample")
+    fpsample_form = sampling._fpsample_farthest_points
+    rng = np.random.default_rng(0)
+    for _ in range(300):
+        points = rng.integers(0, 4, (int(rng.integers(8, 33)), 3)).astype(np.float32)
+        points[0] = -1  # lowest on every axis, as the anchor is
+        height = int(rng.integers(1, 4))
+        expected = fpsample_form(points, 8, height)
+        np.testing.assert_array_equal(bucket_farthest_points(points, 8, height), expected)
+
+
+def test_both_forms_split_their_trees_alike_where_float32_sums_drift() -> None:
+    pytest.importorskip("fpsample")
+    fpsample_form = sampling._fpsample_farthest_points
+    rng = np.random.default_rng(0)
+    points = rng.integers(0, 4, (20_000, 3)).astype(np.float32)
+    points[:, 0] = 0.1  # the running sum of these is not their number times 0.1
+    points[0], points[1] = (-20, -1, -1), (20.2, 4, 4)
+    np.testing.assert_array_equal(bucket_farthest_points(points, 18, 1), fpsample_form(points, 18, 1))
+
+
 @pytest.mark.parametrize("number", [4, 17])
 def test_both_forms_give_the_same_indices_of_a_whole_frame(number: int) -> None:
     points = gazebo_cloud(number)

@@ -114,10 +114,14 @@ def test_states_of_a_pose_stay_together_and_no_learned_pose_is_near_a_tested_one
         }
 
 
-def test_a_fold_by_pose_tests_near_and_far_poses() -> None:
+def test_a_fold_by_pose_tests_near_poses_of_one_bearing_and_far_ones_of_another() -> None:
     for roles in draw_splits(ALL, "by-pose", 0):
-        bands = {row["distance_band"] for row in ALL if roles[row["sample_id"]] == "test"}
-        assert len(bands) == 4
+        tested = [row for row in ALL if roles[row["sample_id"]] == "test"]
+        assert len({row["distance_band"] for row in tested}) == 4
+        distance_m = np.array([float(row["distance_m"]) for row in tested])
+        bearing_deg = np.array([float(row["robot_angle_deg"]) for row in tested])
+        far = distance_m > np.median(distance_m)
+        assert abs(np.median(bearing_deg[far]) - np.median(bearing_deg[~far])) > 50
 
 
 @pytest.mark.parametrize("protocol", ["paper", "by-pose"])
