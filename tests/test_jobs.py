@@ -79,19 +79,23 @@ def test_pieces_and_paths_must_belong_together(tmp_path: Path) -> None:
         run_pieces(square, [1, 2], piece_paths(tmp_path, 1, ".txt"), 1)
 
 
-def test_workers_end_when_their_parent_is_killed(tmp_path: Path) -> None:
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT])
+def test_workers_end_when_their_parent_is_ended(how: signal.Signals, tmp_path: Path) -> None:
     script, folder = tmp_path / "job.py", tmp_path / "pieces"
     folder.mkdir()
     script.write_text(SCRIPT, encoding="utf-8")
-    with subprocess.Popen([sys.executable, script, folder], stdout=subprocess.PIPE) as parent:
+    with subprocess.Popen(
+        [sys.executable, script, folder], stdout=subprocess.PIPE, stderr=subprocess.STDOUT
+    ) as parent:
         waited_until = time.monotonic() + 60
         while len(list(folder.iterdir())) < 2:
             assert parent.poll() is None
             assert time.monotonic() < waited_until
             time.sleep(0.01)
-        parent.send_signal(signal.SIGKILL)
+        parent.send_signal(how)
         # Workers inherited the pipe and sleep for minutes: it ends early only if they are ended.
-        parent.communicate(timeout=30)
+        output, _ = parent.communicate(timeout=30)
+    assert output.count(b"Traceback") <= 1, "workers are silent"
 
 
 def test_there_is_always_a_worker() -> None:

@@ -5,14 +5,17 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import signal
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from multiprocessing.synchronize import Event
 from pathlib import Path
 from typing import TypeVar
 
 Piece = TypeVar("Piece")
 Progress = Callable[[int, int], None]  # (pieces done, pieces in all)
+_LOOK_EVERY_S = 0.2
 
 
 def no_progress(done: int, total: int) -> None:
@@ -39,7 +42,7 @@ def run_pieces(
     """Call `work(piece, path)` for every piece whose file is missing; a killed run goes on where it was.
 
     `work` must be a top-level function that writes `path` atomically. Its first error stops the job as soon as the
-    pieces in work are done; finished pieces stay.
+    pieces in work are done, a key press of the user at once; finished pieces stay.
     """
     missing = [(piece, path) for piece, path in zip(pieces, paths, strict=True) if not path.exists()]
     done = len(pieces) - len(missing)
@@ -52,27 +55,32 @@ def run_pieces(
         return
     # spawn: a forked child of a process that runs torch or BLAS threads can hang.
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(min(workers, len(missing)), context, _end_with_parent) as pool:
+    stop = context.Event()
+    with ProcessPoolExecutor(min(workers, len(missing)), context, _end_with_parent, (stop,)) as pool:
         futures = [pool.submit(work, piece, path) for piece, path in missing]
         try:
             for future in as_completed(futures):
                 future.result()
                 done += 1
                 progress(done, len(pieces))
-        except BaseException:
+        except BaseException as error:
+            if not isinstance(error, Exception):
+                stop.set()
             # A second shutdown, by the with block, would not wait: workers would go on writing after the return.
             pool.shutdown(cancel_futures=True)
             raise
 
 
-def _end_with_parent() -> None:
-    """Let a worker end at once when its parent is killed: an orphan would go on writing beside the restarted job."""
+def _end_with_parent(stop: Event) -> None:
+    """Let a worker end when its parent is killed or stopped: an orphan would go on writing beside the restarted job."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides, and workers print no tracebacks
     parent = multiprocessing.parent_process()
     if parent is None:
         return
 
     def watch() -> None:
-        parent.join()
+        while parent.is_alive() and not stop.wait(_LOOK_EVERY_S):
+            pass
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()
