@@ -14,9 +14,8 @@ from doorstate.types import Indices, Points
 NUM_POINTS = 4096  # the paper's cloud size
 MIN_POINTS = 128  # fewer cannot fill the largest neighbourhood of a network
 SCALE_M = 3.0  # half the depth of a typical frame: networks were designed for clouds of about unit radius
-_LARGEST_MEDIAN_M = (
-    50.0  # no depth camera reaches this far; a cloud in millimetres has medians in the thousands
-)
+# No depth camera reaches farther; a cloud in millimetres has medians in the thousands.
+_LARGEST_MEDIAN_M = 50.0
 _SMALLEST_MEDIAN_M = 0.02
 _NO_RETURN = 1e6  # in any unit; some drivers write FLT_MAX where nothing returned
 
