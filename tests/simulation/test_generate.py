@@ -94,6 +94,16 @@ def test_the_three_states_share_one_pose() -> None:
     assert len({row.sample_id for row in rows}) == 3
 
 
+def test_heading_and_opening_angles_are_drawn_independently() -> None:
+    drawn = []
+    for index in range(0, 1353, 3):
+        rows = draw_pose(OGUROB, 1, index)
+        jitter_deg = math.remainder(rows[0].heading_deg - rows[0].robot_angle_deg - 180, 360)
+        drawn.append([jitter_deg, *(row.opening_angle_deg for row in rows)])
+    correlation = np.corrcoef(np.array(drawn), rowvar=False)
+    assert np.abs(correlation - np.eye(4)).max() < 0.2
+
+
 def test_seeds_and_poses_draw_their_own() -> None:
     angles = {draw_pose(OGUROB, seed, index)[1].opening_angle_deg for seed in range(5) for index in range(5)}
     assert len(angles) == 25

@@ -111,7 +111,8 @@ def draw_pose(preset: Preset, seed: int, index: int) -> list[SampleRow]:
     rows = []
     for state in DoorState:
         low, high = preset.angles_deg[state.label]  # type: ignore[index]
-        angle_deg = float(np.random.default_rng([seed, index, int(state)]).uniform(low, high))
+        # From 1: numpy pads short seeds with zeros, so that 0 would draw the heading's number again.
+        angle_deg = float(np.random.default_rng([seed, index, 1 + int(state)]).uniform(low, high))
         rows.append(
             SampleRow(
                 sample_id=f"p{index:04d}-{state.label}",
