@@ -27,13 +27,15 @@ def run(arguments: str) -> None:
 def main(folder: str) -> None:
     """Run the demo into `folder`, a path below the repository."""
     started = time.monotonic()
-    run(f"simulate --preset ogurob --poses 50 --out {folder}/simulated")
+    run(f"simulate --preset ogurob --poses 80 --out {folder}/simulated")
     run(f"prepare {folder}/simulated --points 512 --out {folder}/clouds")
     run(f"compare experiments/demo.toml --data {folder}/clouds --jobs 2 --out {folder}/comparison")
     run(f"report {folder}/comparison --out {folder}/report")
     # New doors as files, from another seed: what a robot would hand over.
-    run(f"simulate --preset ogurob --poses 3 --seed 7 --keep pcd --out {folder}/new")
+    run(f"simulate --preset ogurob --poses 5 --seed 7 --keep pcd --out {folder}/new")
     run(f"predict {folder}/new/pcd --weights {folder}/comparison/runs/pointnet2/fold0/weights.safetensors")
+    # The same files with the weights of the package, which have seen the complete data set.
+    run(f"predict {folder}/new/pcd")
     page = (REPOSITORY / folder / "report" / "report.html").resolve()
     print(f"\nThe report: {page}\nDone in {(time.monotonic() - started) / 60:.1f} minutes.")
 

@@ -7,7 +7,6 @@ Exit codes: 0 all well, 1 something could not be done (said in one line), 2 wron
 
 from __future__ import annotations
 
-import logging
 import sys
 
 import typer
@@ -32,7 +31,6 @@ for command in (simulate, prepare, train, compare, report, predict, info):
 
 def main() -> None:
     """Run the command line; our own exceptions become one line on standard error."""
-    logging.getLogger("lightning_fabric").setLevel(logging.WARNING)
     try:
         app()
     except DoorstateError as error:

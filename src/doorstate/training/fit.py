@@ -7,6 +7,7 @@ same weights as one that was not, given the same number of threads.
 
 from __future__ import annotations
 
+import logging
 import math
 import time
 from collections.abc import Iterator, Mapping
@@ -103,6 +104,7 @@ def fit(
         return run.read_metrics()
     samples = _samples(roles)
     keep_freed_memory()
+    logging.getLogger("lightning_fabric").setLevel(logging.WARNING)  # it announces every run's precision
     fabric = lightning_fabric.Fabric(accelerator="auto", devices=1, precision=_precision(config.recipe))
     with torch.random.fork_rng():
         torch.manual_seed(_seed(config, 0))
