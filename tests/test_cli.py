@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import csv
 import json
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -282,6 +283,14 @@ def test_prepare_takes_class_folders(run: Run, simulated_folder: Path, tmp_path:
     code, out, _ = run("prepare", pcd, "--out", tmp_path / "clouds", "--points", 128, "--workers", 1)
     assert code == 0
     assert out.startswith("36 clouds of 128 points")
+    assert "12 closed, 12 semi_open, 12 open" in out
+    shutil.copytree(pcd / "open", tmp_path / "partial" / "open")
+    code, _, err = run(
+        "prepare", tmp_path / "partial", "--out", tmp_path / "one", "--points", 128, "--workers", 1
+    )
+    assert code == 0
+    assert "no clouds of state closed" in err
+    assert "no clouds of state semi_open" in err
 
 
 def recorded() -> Iterator[dict[str, str]]:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from doorstate.files import atomic_path, write_text
+from doorstate.files import atomic_path, is_vacant, write_text
 
 
 def test_the_target_appears_when_the_block_ends(tmp_path: Path) -> None:
@@ -50,3 +50,12 @@ def test_a_block_that_writes_nothing_is_an_error_and_keeps_the_old_file(tmp_path
 def test_text_is_utf_8_whatever_the_locale(tmp_path: Path) -> None:
     write_text(tmp_path / "a.txt", "yarı açık kapı")
     assert (tmp_path / "a.txt").read_bytes() == "yarı açık kapı".encode()
+
+
+def test_a_folder_is_vacant_until_something_whole_is_in_it(tmp_path: Path) -> None:
+    assert is_vacant(tmp_path / "new")
+    (tmp_path / ".123.tmp.manifest.csv").touch()
+    assert is_vacant(tmp_path)
+    (tmp_path / "notes.txt").touch()
+    assert not is_vacant(tmp_path)
+    assert not is_vacant(tmp_path / "notes.txt")

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The README's picture: one pose, three states, shaded image above and cloud below.
 
-    python tools/readme_picture.py data/ogurob-4096 p0655 docs/images/states.png
+python tools/readme_picture.py data/ogurob-4096 p0655 docs/images/states.png
 """
 
 from __future__ import annotations

@@ -22,6 +22,11 @@ def atomic_path(target: Path) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
+def is_vacant(folder: Path) -> bool:
+    """Whether something new may be made here: nothing is there, or at most what a killed write left behind."""
+    return not folder.exists() or (folder.is_dir() and all(".tmp." in path.name for path in folder.iterdir()))
+
+
 def write_text(target: Path, text: str) -> None:
     """Write `text` as UTF-8 in one step."""
     with atomic_path(target) as temporary:

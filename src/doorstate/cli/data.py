@@ -96,6 +96,7 @@ def prepare(
     from doorstate.console import err, progress_bar
     from doorstate.console import out as stdout
     from doorstate.dataset.prepare import prepare_dataset
+    from doorstate.types import STATES
 
     options = read_options(frame, roll, units, depth_scale, intrinsics, (fx, fy, cx, cy))
     with progress_bar("Preparing") as progress:
@@ -104,6 +105,11 @@ def prepare(
         err.print(f"left out {row['file'] or row['sample_id']}: {row['reason']}", markup=False)
     if summary.rejected:
         err.print(f"{len(summary.rejected)} clouds left out, all in {out / 'rejected.csv'}")
-    stdout.print(f"{len(summary.dataset)} clouds of {points} points in {out}")
+    counts = [int((summary.dataset.labels == label).sum()) for label in range(len(STATES))]
+    for state, count in zip(STATES, counts, strict=True):
+        if not count:
+            err.print(f"no clouds of state {state}: is its folder named in a way we do not know?")
+    shares = ", ".join(f"{count} {state}" for state, count in zip(STATES, counts, strict=True))
+    stdout.print(f"{len(summary.dataset)} clouds of {points} points in {out} ({shares})", soft_wrap=True)
     if summary.rejected:
         raise typer.Exit(1)

@@ -27,7 +27,7 @@ from doorstate.dataset.store import (
 )
 from doorstate.dataset.strata import distance_band, region
 from doorstate.errors import CameraError, CloudContentError, CloudError, ConfigError, DatasetError
-from doorstate.files import atomic_path, write_text
+from doorstate.files import atomic_path, is_vacant, write_text
 from doorstate.jobs import Progress, default_workers, no_progress, piece_paths, run_pieces
 from doorstate.simulation.generate import replay
 from doorstate.simulation.manifest import read_csv, unflatten, write_csv
@@ -136,7 +136,7 @@ def _claim(folder: Path, settings: dict[str, object]) -> None:
         if path.read_text(encoding="utf-8") != text:
             raise ConfigError(f"{folder}: holds a preparation of something else; choose another folder")
         return
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+    if not is_vacant(folder):
         raise ConfigError(f"{folder}: exists and holds something else; choose another folder")
     write_text(path, text)
 

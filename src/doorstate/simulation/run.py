@@ -19,7 +19,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from doorstate.clouds.pcd import write_pcd
 from doorstate.errors import ConfigError, DatasetError
-from doorstate.files import atomic_path, write_text
+from doorstate.files import atomic_path, is_vacant, write_text
 from doorstate.jobs import Progress, default_workers, no_progress, piece_paths, run_pieces
 from doorstate.simulation.generate import Frame, Preset, SampleRow, pose_indices, simulate_pose
 from doorstate.simulation.manifest import flatten, read_csv, write_csv
@@ -107,7 +107,7 @@ def _claim(folder: Path, settings: SimulationSettings) -> None:
         if read_settings(folder) != settings:
             raise ConfigError(f"{folder}: holds a simulation with other settings; choose another folder")
         return
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+    if not is_vacant(folder):
         raise ConfigError(f"{folder}: exists and holds something else; choose another folder")
     write_text(folder / _SETTINGS, json.dumps(settings.model_dump(), indent=2) + "\n")
 
