@@ -43,7 +43,7 @@ _FIXED: dict[Literal["closed", "semi_open", "open"], tuple[float, float]] = {
     "semi_open": (45.0, 45.0),
     "open": (90.0, 90.0),
 }
-# The leaf swings towards the robot: with a leaf that swings away, 215 of the 1353 poses give one and the same image for
+# The leaf swings towards the robot: with a leaf that swings away, 240 of the 1353 poses give one and the same image for
 # semi-open and open, and nobody could pass 95 %, yet the paper reports over 98 % (docs/adr/0003).
 _TOWARDS, _AWAY = Door(swing="towards"), Door(swing="away")
 PRESETS = {
