@@ -18,7 +18,7 @@ check: setup
 	$(BIN)/python tools/check_imports.py
 
 test: setup check
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n auto
 
 demo: setup
 	$(BIN)/python tools/demo.py $(DEMO)
