@@ -6,7 +6,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from doorstate.errors import DatasetError
@@ -17,6 +17,7 @@ ROW = draw_pose(PRESETS["ogurob"], 0, 0)[0]
 _finite = st.floats(allow_nan=False, allow_infinity=False)
 
 
+@example(x_m=0.0, angle=0.0, width=1.0, sample="\r")
 @given(x_m=_finite, angle=_finite, width=_finite, sample=st.text(st.characters(codec="utf-8"), max_size=12))
 @settings(deadline=None, max_examples=80)
 def test_every_row_comes_back(

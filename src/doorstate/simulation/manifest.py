@@ -56,7 +56,15 @@ def write_csv(path: Path, rows: Sequence[Mapping[str, str]]) -> None:
     """Write rows under the union of their columns, in order of appearance."""
     names = list(dict.fromkeys(name for row in rows for name in row))
     text = io.StringIO(newline="")
-    writer = csv.DictWriter(text, names, restval="", lineterminator="\n")
+    # Before Python 3.13 the writer leaves a lone carriage return unquoted, which reads back as the end of a line.
+    returns = any("\r" in value for row in rows for value in (*row, *row.values()))
+    writer = csv.DictWriter(
+        text,
+        names,
+        restval="",
+        lineterminator="\n",
+        quoting=csv.QUOTE_ALL if returns else csv.QUOTE_MINIMAL,
+    )
     writer.writeheader()
     writer.writerows(rows)
     write_text(path, text.getvalue())
