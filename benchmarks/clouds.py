@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Door clouds to time with: the same ones every time, drawn from one seed or read from a prepared data set."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from doorstate.clouds.preparation import normalize, prepare_cloud
+from doorstate.dataset.store import open_dataset
+from doorstate.errors import ConfigError
+from doorstate.simulation.generate import PRESETS, draw_pose, pose_indices, replay
+from doorstate.types import STATES, Points
+
+_SEED = 0
+_PRESET = PRESETS["ogurob"]
+
+
+class Clouds(NamedTuple):
+    """Prepared clouds in farthest-point order, (M, n, 3) metres, and their (M,) labels."""
+
+    points: Points
+    labels: NDArray[np.int64]
+
+    def cut(self, num_points: int) -> Clouds:
+        """The first points of every cloud, normalised as a network wants them."""
+        return Clouds(normalize(self.points[:, :num_points]), self.labels)
+
+
+def raw_cloud() -> Points:
+    """(480, 640, 3) organized cloud in metres as the simulated depth camera gives it, NaN where nothing is."""
+    return replay(draw_pose(_PRESET, _SEED, pose_indices(3)[1])[1]).points
+
+
+def simulated_clouds(count: int, num_points: int) -> Clouds:
+    """Render and prepare doors in all three states, poses spread over the room.
+
+    Raises:
+        ConfigError: more points are asked for than a cloud has.
+    """
+    poses = pose_indices(max(3, -(-count // len(STATES))))
+    rows = [row for pose in poses for row in draw_pose(_PRESET, _SEED, pose)][:count]
+    clouds = [prepare_cloud(replay(row).points, num_points).points for row in rows]
+    fewest = min(map(len, clouds))
+    if fewest < num_points:
+        raise ConfigError(f"--points {num_points}: a simulated cloud has only {fewest} distinct points")
+    labels = np.array([STATES.index(row.state) for row in rows], dtype=np.int64)
+    return Clouds(np.stack(clouds), labels)
+
+
+def dataset_clouds(folder: Path, count: int, num_points: int) -> Clouds:
+    """Clouds spread evenly over a prepared data set.
+
+    Raises:
+        ConfigError: the data set has fewer clouds or points.
+        DatasetError: there is none, or it is damaged.
+    """
+    dataset = open_dataset(folder)
+    if dataset.num_points < num_points or len(dataset) < count:
+        raise ConfigError(
+            f"{folder}: holds {len(dataset)} clouds of {dataset.num_points} points, "
+            f"{count} of {num_points} are needed"
+        )
+    chosen = np.linspace(0, len(dataset) - 1, count).astype(np.int64)
+    return Clouds(np.array(dataset.clouds[chosen, :num_points]), dataset.labels[chosen])

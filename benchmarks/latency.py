@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From a raw organized cloud in memory to a state: where each millisecond goes."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from types import ModuleType
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
+
+from benchmarks.clouds import raw_cloud
+from benchmarks.store import Group
+from benchmarks.tables import milliseconds
+from doorstate.clouds import preparation
+from doorstate.deployment import predictor
+from doorstate.evaluation.table import Table
+from doorstate.jobs import Progress
+from doorstate.networks import create_network
+from doorstate.training.fit import threads as use_threads
+from doorstate.training.weights import WeightsCard
+from doorstate.types import Points
+
+STAGES = ("clean", "sample", "network", "total")
+_NOTE = (
+    "Milliseconds of one `Predictor` call, median (90th percentile), on a simulated 640 × 480 cloud in memory; the "
+    "weights are untrained, which changes no time. *Clean* drops unmeasured points and checks the rest, *sample* puts "
+    "them in farthest-point order, *network* centres them and computes the probabilities."
+)
+
+
+def measure(
+    networks: Sequence[str],
+    numbers_of_points: Sequence[int],
+    threads: Sequence[int],
+    repeats: int,
+    progress: Progress,
+) -> list[Group]:
+    """Times of every stage in every repeat; networks take turns."""
+    raw, rows = raw_cloud(), []
+    settings = [(count, points) for count in threads for points in numbers_of_points]
+    for done, (count, points) in enumerate(settings):
+        progress(done, len(settings))
+        predictors = {
+            name: predictor.Predictor(
+                create_network(name), WeightsCard(network=name, num_points=points), points
+            )
+            for name in networks
+        }
+        with use_threads(count):
+            for predict in predictors.values():
+                predict(raw)
+            runs = [
+                {name: _stages(predict, raw) for name, predict in predictors.items()} for _ in range(repeats)
+            ]
+        for name in networks:
+            stages = {stage: [run[name][stage] for run in runs] for stage in STAGES}
+            rows.append({"network": name, "points": points, "threads": count} | {"stages": _summary(stages)})
+    progress(len(settings), len(settings))
+    return rows
+
+
+def latency_table(rows: Sequence[Group]) -> Table:
+    """One row per network, number of points and threads."""
+    cells = [
+        (
+            row["network"],
+            str(row["points"]),
+            str(row["threads"]),
+            *(
+                f"{milliseconds(s['median_ms'])} ({milliseconds(s['p90_ms'])})"
+                for s in row["stages"].values()
+            ),
+        )
+        for row in rows
+    ]
+    return Table(
+        "From a raw cloud to a state", ("network", "points", "threads", *STAGES), tuple(cells), _NOTE, 1
+    )
+
+
+def _summary(stages: dict[str, list[float]]) -> dict[str, dict[str, Any]]:
+    return {
+        stage: {
+            "median_ms": float(np.median(values)),
+            "p90_ms": float(np.percentile(values, 90)),
+            "all_ms": values,
+        }
+        for stage, values in stages.items()
+    }
+
+
+def _stages(predict: predictor.Predictor, raw: Points) -> dict[str, float]:
+    """Milliseconds of each stage of one call, taken inside it: stages that are timed one by one are other stages."""
+    with (
+        _timed(preparation, "farthest_point_indices") as sampling,
+        _timed(predictor, "prepare_cloud") as preparing,
+    ):
+        total = predict(raw).milliseconds
+    sample, prepare = sum(sampling), sum(preparing)
+    return {"clean": prepare - sample, "sample": sample, "network": total - prepare, "total": total}
+
+
+@contextmanager
+def _timed(module: ModuleType, name: str) -> Iterator[list[float]]:
+    """Note the milliseconds of every call that a module makes of one function."""
+    function, spent = getattr(module, name), []
+
+    def timed(*arguments: Any) -> Any:
+        started = time.perf_counter()
+        answer = function(*arguments)
+        spent.append((time.perf_counter() - started) * 1000)
+        return answer
+
+    with patch.object(module, name, timed):
+        yield spent

@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Speed of the networks; the forms of one take turns, so that their ratios hold on a noisy machine."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from statistics import median
+from typing import Any, NamedTuple
+
+from benchmarks.clouds import Clouds
+from benchmarks.forms import BASELINES, Form, forms_of
+from benchmarks.store import Group, Store
+from benchmarks.subjects import OperationCount, Subject, Task
+from benchmarks.tables import networks_table
+from benchmarks.timing import MatrixPeak
+from benchmarks.workers import Worker
+from doorstate.errors import RunError
+from doorstate.evaluation.table import Table
+from doorstate.jobs import Progress
+from doorstate.training.environment import bf16_is_quick
+
+INFERENCE_BATCHES = (1, 16)
+Round = dict[str, float]  # train_ms, infer_1_ms, infer_16_ms per cloud, and peak_gflops of the round
+
+
+class Plan(NamedTuple):
+    """How everything is measured."""
+
+    batch: int
+    repeats: int
+    threads: int
+    checkouts: dict[str, Path]
+    pyg: bool
+    same_allocator: bool
+
+    def forms(self, network: str) -> list[Form]:
+        """Forms of a network under this plan."""
+        return forms_of(network, network in self.checkouts, self.pyg)
+
+
+def run(
+    plan: Plan,
+    wanted: Sequence[tuple[str, int]],
+    draw: Callable[[], Clouds],
+    store: Store,
+    progress: Progress,
+) -> None:
+    """Measure what the store does not hold yet, network by network and number by number of points.
+
+    A group with a row that failed is measured again.
+    """
+    missing = [pair for pair in wanted if not _finished(store.groups.get(_key(*pair)))]
+    if not missing:
+        store.save(table_of(store, wanted, plan))
+        return
+    clouds, done = draw(), 0
+    total = sum(plan.repeats * len(plan.forms(network)) for network, _ in missing)
+    progress(done, total)
+
+    def tick() -> None:
+        nonlocal done
+        done += 1
+        progress(done, total)
+
+    with Worker(MatrixPeak, plan.threads) as peak:
+        for network, points in missing:
+            store.groups[_key(network, points)] = _measure(plan, network, clouds.cut(points), peak, tick)
+            store.save(table_of(store, wanted, plan))
+
+
+def _key(network: str, points: int) -> str:
+    return f"{network} {points}"
+
+
+def _finished(group: Group | None) -> bool:
+    return group is not None and not any("reason" in row for row in group["rows"])
+
+
+def table_of(store: Store, wanted: Sequence[tuple[str, int]], plan: Plan) -> Table:
+    """Groups asked for now, in that order, and then what was measured before."""
+    keys = dict.fromkeys([_key(*pair) for pair in wanted] + list(store.groups))
+    groups = [store.groups[key] for key in keys if key in store.groups]
+    return networks_table(groups, plan.same_allocator)
+
+
+def _measure(plan: Plan, network: str, clouds: Clouds, peak: Worker, tick: Callable[[], None]) -> Group:
+    with Worker(OperationCount, network, clouds) as counter:
+        gflop = counter.call("training_gflop")
+    rounds: dict[str, list[Round]] = {}
+    memory: dict[str, float] = {}
+    reasons: dict[str, str] = {}
+    forms = plan.forms(network)
+    with ExitStack() as stack:
+        workers = {
+            form: stack.enter_context(Worker(Subject, _task(plan, network, form, clouds))) for form in forms
+        }
+        for _ in range(plan.repeats):
+            peaks = {
+                bf16: peak.call("gflops", bf16) for bf16 in ((False, True) if bf16_is_quick() else (False,))
+            }
+            for form, worker in workers.items():
+                if form.name not in reasons:
+                    try:
+                        found = _one_round(plan, form, worker) | {"peak_gflops": peaks[form.bf16]}
+                        rounds.setdefault(form.name, []).append(found)
+                        memory[form.name] = worker.call("memory_mib")
+                    except RunError as error:
+                        reasons[form.name] = str(error)
+                tick()
+    rows = [
+        {"form": form.name, "reason": reasons[form.name]}
+        if form.name in reasons
+        else _row(form.name, rounds, memory[form.name], gflop)
+        for form in forms
+    ]
+    num_points = clouds.points.shape[1]
+    return {"network": network, "points": num_points, "training_gflop_per_cloud": gflop, "rows": rows}
+
+
+def _task(plan: Plan, network: str, form: Form, clouds: Clouds) -> Task:
+    checkout = plan.checkouts.get(network)
+    return Task(network, form, clouds, plan.batch, plan.threads, checkout, plan.same_allocator)
+
+
+def _one_round(plan: Plan, form: Form, worker: Worker) -> Round:
+    found = {"train_ms": worker.call("train_s") * 1000 / plan.batch}
+    if not form.cached:  # a new cloud's neighbours are not known
+        for batch in INFERENCE_BATCHES:
+            found[f"infer_{batch}_ms"] = worker.call("infer_s", batch) * 1000 / batch
+    return found
+
+
+def _row(form: str, rounds: dict[str, list[Round]], memory_mib: float, gflop: float) -> dict[str, Any]:
+    own = rounds[form]
+    reached = [gflop / (one["train_ms"] / 1000) for one in own]
+    return {
+        "form": form,
+        "rounds": own,
+        **{name: median(one[name] for one in own) for name in own[0]},
+        "memory_mib": memory_mib,
+        "train_gflops": median(reached),
+        "share_of_peak": median(rate / one["peak_gflops"] for rate, one in zip(reached, own, strict=True)),
+        "speedups": {
+            baseline.name: _speedups(own, rounds[baseline.name])
+            for baseline in BASELINES
+            if baseline.name != form and len(rounds.get(baseline.name, [])) == len(own)
+        },
+    }
+
+
+def _speedups(own: list[Round], baseline: list[Round]) -> dict[str, float]:
+    """How many times the baseline's time of the same round, median over the rounds."""
+    names = [name for name in own[0] if name.endswith("_ms")]
+    return {
+        name.removesuffix("_ms"): median(
+            theirs[name] / ours[name] for ours, theirs in zip(own, baseline, strict=True)
+        )
+        for name in names
+    }
