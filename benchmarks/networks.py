@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
@@ -85,38 +86,61 @@ def table_of(store: Store, wanted: Sequence[tuple[str, int]], plan: Plan) -> Tab
     return networks_table(groups, plan.same_allocator)
 
 
+class _Contestant:
+    """One form in its worker, and what was measured of it; after its first failure it takes no more turns."""
+
+    def __init__(self, form: Form, worker: Worker) -> None:
+        self.form, self._worker = form, worker
+        self.rounds: list[Round] = []
+        self.memory_mib = math.nan
+        self.threads = 0
+        self.reason = ""
+
+    def get_ready(self) -> None:
+        """Wait until its worker has imported and built everything."""
+        try:
+            self.threads = self._worker.call("threads")
+        except RunError as error:
+            self.reason = str(error)
+
+    def take_turn(self, batch: int, peak_gflops: float) -> None:
+        """One round: a sample of training, and of inference unless neighbours are given."""
+        if self.reason:
+            return
+        try:
+            found = {"train_ms": self._worker.call("train_s") * 1000 / batch}
+            self.memory_mib = self._worker.call("memory_mib")
+            if not self.form.cached:  # a new cloud's neighbours are not known
+                for clouds in INFERENCE_BATCHES:
+                    found[f"infer_{clouds}_ms"] = self._worker.call("infer_s", clouds) * 1000 / clouds
+            self.rounds.append(found | {"peak_gflops": peak_gflops})
+        except RunError as error:
+            self.reason = str(error)
+
+
 def _measure(plan: Plan, network: str, clouds: Clouds, peak: Worker, tick: Callable[[], None]) -> Group:
     with Worker(OperationCount, network, clouds) as counter:
         gflop = counter.call("training_gflop")
-    rounds: dict[str, list[Round]] = {}
-    memory: dict[str, float] = {}
-    reasons: dict[str, str] = {}
-    forms = plan.forms(network)
+    precisions = (False, True) if bf16_is_quick() else (False,)
     with ExitStack() as stack:
-        workers = {
-            form: stack.enter_context(Worker(Subject, _task(plan, network, form, clouds))) for form in forms
-        }
+        contestants = [
+            _Contestant(form, stack.enter_context(Worker(Subject, _task(plan, network, form, clouds))))
+            for form in plan.forms(network)
+        ]
+        # Workers that still import would take the processor from what is timed.
+        for contestant in contestants:
+            contestant.get_ready()
         for _ in range(plan.repeats):
-            peaks = {
-                bf16: peak.call("gflops", bf16) for bf16 in ((False, True) if bf16_is_quick() else (False,))
-            }
-            for form, worker in workers.items():
-                if form.name not in reasons:
-                    try:
-                        found = _one_round(plan, form, worker) | {"peak_gflops": peaks[form.bf16]}
-                        rounds.setdefault(form.name, []).append(found)
-                        memory[form.name] = worker.call("memory_mib")
-                    except RunError as error:
-                        reasons[form.name] = str(error)
+            peaks = {bf16: peak.call("gflops", bf16) for bf16 in precisions}
+            for contestant in contestants:
+                contestant.take_turn(plan.batch, peaks[contestant.form.bf16])
                 tick()
-    rows = [
-        {"form": form.name, "reason": reasons[form.name]}
-        if form.name in reasons
-        else _row(form.name, rounds, memory[form.name], gflop)
-        for form in forms
-    ]
-    num_points = clouds.points.shape[1]
-    return {"network": network, "points": num_points, "training_gflop_per_cloud": gflop, "rows": rows}
+    return {
+        "network": network,
+        "points": clouds.points.shape[1],
+        "training_gflop_per_cloud": gflop,
+        "rows": [_row(contestant, contestants, gflop) for contestant in contestants],
+    }
 
 
 def _task(plan: Plan, network: str, form: Form, clouds: Clouds) -> Task:
@@ -124,28 +148,23 @@ def _task(plan: Plan, network: str, form: Form, clouds: Clouds) -> Task:
     return Task(network, form, clouds, plan.batch, plan.threads, checkout, plan.same_allocator)
 
 
-def _one_round(plan: Plan, form: Form, worker: Worker) -> Round:
-    found = {"train_ms": worker.call("train_s") * 1000 / plan.batch}
-    if not form.cached:  # a new cloud's neighbours are not known
-        for batch in INFERENCE_BATCHES:
-            found[f"infer_{batch}_ms"] = worker.call("infer_s", batch) * 1000 / batch
-    return found
-
-
-def _row(form: str, rounds: dict[str, list[Round]], memory_mib: float, gflop: float) -> dict[str, Any]:
-    own = rounds[form]
+def _row(contestant: _Contestant, contestants: Sequence[_Contestant], gflop: float) -> dict[str, Any]:
+    if contestant.reason:
+        return {"form": contestant.form.name, "reason": contestant.reason}
+    own = contestant.rounds
     reached = [gflop / (one["train_ms"] / 1000) for one in own]
     return {
-        "form": form,
+        "form": contestant.form.name,
+        "threads": contestant.threads,
         "rounds": own,
         **{name: median(one[name] for one in own) for name in own[0]},
-        "memory_mib": memory_mib,
+        "memory_mib": contestant.memory_mib,
         "train_gflops": median(reached),
         "share_of_peak": median(rate / one["peak_gflops"] for rate, one in zip(reached, own, strict=True)),
         "speedups": {
-            baseline.name: _speedups(own, rounds[baseline.name])
-            for baseline in BASELINES
-            if baseline.name != form and len(rounds.get(baseline.name, [])) == len(own)
+            other.form.name: _speedups(own, other.rounds)
+            for other in contestants
+            if other.form in BASELINES and other is not contestant and not other.reason
         },
     }
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 from collections import defaultdict
 from collections.abc import Sequence
 from typing import Any
@@ -24,8 +25,18 @@ GROUPS: dict[str, tuple[str, ...]] = {
     "batch norm": ("batch_norm", "BatchNorm", "aten::var", "rsqrt", "Moment"),
     "neighbour search": ("topk", "cdist", "sort", "kthvalue", "aten::lt", "aten::le", "nonzero", "bitwise"),
     "gathers and scatters": ("index", "gather", "scatter", "embedding", "Neighbour", "Gather"),
+    "activations": (
+        "relu",
+        "elu",
+        "threshold",
+        "sigmoid",
+        "tanh",
+        "softmax",
+        "dropout",
+        "bernoulli",
+        "nll_loss",
+    ),
     "pooling": ("max", "amin", "aten::mean", "MeanBackward", "Max", "Winner"),
-    "activations": ("relu", "elu", "threshold", "sigmoid", "tanh", "dropout", "bernoulli", "nll_loss"),
     "copies": ("copy", "clone", "contiguous", "aten::cat", "stack", "zero", "fill", "empty", "aten::to"),
     "arithmetic": (
         "add",
@@ -43,7 +54,10 @@ GROUPS: dict[str, tuple[str, ...]] = {
     ),
 }
 OTHER = "other"
+_NOTHING: dict[str, Any] = {"ms": 0.0, "operators": []}
 _SHOWN = 3
+_LEAST_SHARE = 0.005
+_ENGINE = "autograd::engine::evaluate_function: "
 _NOTE = (
     "Self time on the CPU by torch's profiler, which itself slows small operators down: read shares, not "
     "totals. Training is one step with AdamW on a batch of {batch}, inference one cloud; milliseconds are "
@@ -72,6 +86,7 @@ def measure(
     progress: Progress,
 ) -> list[Group]:
     """Time per group of operators, and its longest operators, of every network, form and phase."""
+    os.environ["KINETO_LOG_LEVEL"] = "99"  # workers would tell of every profile on standard error
     rows: list[Group] = []
     pairs = [(network, form) for network in networks for form in forms]
     for done, (network, form) in enumerate(pairs):
@@ -99,8 +114,10 @@ def profile_table(rows: Sequence[Group], batch: int) -> Table:
             {name for groups in found.values() for name in groups}, key=lambda n: -_ms(found, forms, n)
         )
         for name in names:
+            if all(found[form].get(name, _NOTHING)["ms"] < _LEAST_SHARE * totals[form] for form in forms):
+                continue
             times = (_share(found[form].get(name), totals[form]) for form in forms)
-            longest = found[forms[-1]].get(name, {"operators": []})["operators"]
+            longest = found[forms[-1]].get(name, _NOTHING)["operators"]
             cells.append((network, phase, name, *times, ", ".join(longest)))
     columns = ("network", "phase", "group", *forms, f"longest, {forms[-1]}")
     return Table("Where the time goes", columns, tuple(cells), _NOTE.format(batch=batch), text_columns=3)
@@ -112,12 +129,12 @@ def _grouped(operators: Sequence[tuple[str, float]]) -> dict[str, dict[str, Any]
         group = groups[group_of(name)]
         group["ms"] += spent_ms
         if len(group["operators"]) < _SHOWN:
-            group["operators"].append(name.rpartition("::")[2])
+            group["operators"].append(name.removeprefix(_ENGINE).rpartition("::")[2])
     return dict(groups)
 
 
 def _ms(found: dict[str, Any], forms: Sequence[str], name: str) -> float:
-    return max(float(found[form].get(name, {"ms": 0.0})["ms"]) for form in forms)
+    return max(float(found[form].get(name, _NOTHING)["ms"]) for form in forms)
 
 
 def _share(group: dict[str, Any] | None, total_ms: float) -> str:

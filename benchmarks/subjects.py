@@ -101,7 +101,8 @@ class Subject:
 
     def _sample(self, name: str, step: Callable[[], object]) -> float:
         # A step of many seconds is not warmer for another one before it.
-        seconds = self._last_s[name] = step_s(step, warm_up=self._last_s.get(name, 0.0) < _SLOW_S)
+        seconds = step_s(step, warm_up=self._last_s.get(name, 0.0) < _SLOW_S)
+        self._last_s[name] = seconds
         return seconds
 
     def _autocast(self) -> AbstractContextManager[object]:
@@ -119,7 +120,7 @@ class OperationCount:
         """2 operations per multiply-add of the forward pass, times 3: backward takes twice as many."""
         with _Products() as products:
             self._form(self._points)
-        return 3 * products.operations / 1e9
+        return float(3 * products.operations / 1e9)
 
 
 class _Products(TorchDispatchMode):  # type: ignore[no-untyped-call]
