@@ -10,8 +10,9 @@ import pytest
 import torch
 from torch import Tensor, nn
 
-from doorstate.networks.layers import DenseMax, PointLinear, PooledMLP, RowBatchNorm, set_batchnorm
-from doorstate.networks.ops import ball_query, gather_rows
+from doorstate.networks.layers import Dense, DenseMax, PointLinear, PooledMLP, RowBatchNorm, set_batchnorm
+from doorstate.networks.ops import gather_rows
+from doorstate.networks.search import ball_query
 
 DTYPES = [torch.float64, torch.float32]
 
@@ -57,12 +58,61 @@ def test_pooled_mlp_equals_its_plain_twin(dtype: torch.dtype, grouped: tuple[Ten
     plain.assert_twins(PooledMLP(5, (8, 9, 10)), fast, literal, [points, features], dtype)
 
 
-def test_relu_after_the_maximum_is_relu_before_it() -> None:
-    rows = torch.randn(3, 4, 6, 5, generator=torch.Generator().manual_seed(0))
-    module = DenseMax(5, 7)
-    twin = copy.deepcopy(module)
-    expected = torch.relu(twin.norm(twin.linear(rows))).amax(-2)
-    torch.testing.assert_close(module(rows), expected)
+def randomised(module: nn.Module) -> nn.Module:
+    """Scales of both signs and running statistics that are not those of an untrained layer."""
+    for norm in module.modules():
+        if isinstance(norm, RowBatchNorm):
+            torch.nn.init.uniform_(norm.weight, -1, 1)
+            torch.nn.init.uniform_(norm.bias, -0.5, 0.5)
+            torch.nn.init.uniform_(norm.running_mean, -0.5, 0.5)
+            torch.nn.init.uniform_(norm.running_var, 0.5, 2)
+    for linear in module.modules():
+        if isinstance(linear, nn.Linear) and linear.bias is not None:
+            torch.nn.init.uniform_(linear.bias, -1, 1)
+    return module
+
+
+@pytest.mark.parametrize("dtype", DTYPES)
+@pytest.mark.parametrize("training", [True, False])
+def test_dense_equals_its_plain_twin(dtype: torch.dtype, training: bool) -> None:
+    rows = torch.randn(3, 7, 5, generator=torch.Generator().manual_seed(0)) + 1
+    plain.assert_twins(
+        randomised(Dense(5, 8)).train(training),
+        lambda module, leaves: module(leaves[0]),
+        lambda module, leaves: plain.dense(leaves[0], module[0], module[1]),
+        [rows],
+        dtype,
+    )
+
+
+# Few points take the gradient of all rows, many only that of the rows that have a maximum.
+@pytest.mark.parametrize("dtype", DTYPES)
+@pytest.mark.parametrize("training", [True, False])
+@pytest.mark.parametrize("shape", [(2, 6, 8, 5), (3, 256, 5), (2, 300, 5)])
+def test_dense_max_equals_its_plain_twin(dtype: torch.dtype, training: bool, shape: tuple[int, ...]) -> None:
+    rows = torch.randn(shape, generator=torch.Generator().manual_seed(0)) + 1
+    rows[..., -2:, :] = rows[..., :2, :]  # duplicate points
+    plain.assert_twins(
+        randomised(DenseMax(5, 16)).train(training),
+        lambda module, leaves: module(leaves[0]),
+        lambda module, leaves: plain.dense(leaves[0], module.linear, module.norm).max(-2).values,
+        [rows],
+        dtype,
+    )
+
+
+@pytest.mark.parametrize("make", [Dense, DenseMax])
+@pytest.mark.parametrize("count", [40, 300])
+def test_running_statistics_are_those_of_batch_norm(make: type[nn.Module], count: int) -> None:
+    rows = torch.randn(2, count, 5, generator=torch.Generator().manual_seed(0)).double() * 3 + 1
+    module = randomised(make(5, 8)).double()
+    linear, norm = list(module.children())[:2]
+    twin = copy.deepcopy(norm)
+    for _ in range(2):
+        twin(linear(rows))
+        module(rows)
+    for name, expected in twin.state_dict().items():
+        torch.testing.assert_close(norm.state_dict()[name], expected, rtol=1e-12, atol=1e-12)
 
 
 def test_coordinates_are_not_rounded_under_autocast() -> None:
@@ -70,17 +120,7 @@ def test_coordinates_are_not_rounded_under_autocast() -> None:
     points = torch.randn(2, 50, 3, generator=torch.Generator().manual_seed(0))
     exact = layer(points)
     with torch.autocast("cpu", dtype=torch.bfloat16):
-        assert torch.equal(layer(points), exact)
-
-
-def test_normalize_is_batch_norm_with_statistics_from_elsewhere() -> None:
-    rows = torch.randn(4, 25, 6, generator=torch.Generator().manual_seed(0), dtype=torch.float64) * 3 + 1
-    norm, twin = RowBatchNorm(6).double(), RowBatchNorm(6).double()
-    flat = rows.flatten(0, 1)
-    out = norm.normalize(rows, flat.mean(0), flat.var(0, correction=0), count=100)
-    torch.testing.assert_close(out, twin(rows), rtol=0, atol=1e-12)
-    for name, expected in twin.state_dict().items():
-        torch.testing.assert_close(norm.state_dict()[name], expected)
+        assert torch.equal(layer(points), exact.bfloat16())  # rounded once, at the end
 
 
 def test_set_batchnorm_changes_what_it_is_told_to() -> None:

@@ -1,135 +1,121 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Neighbourhood operations against loops, scikit-learn and hand-worked cases."""
+"""Operations on rows against the ordinary ones of torch: values and gradients, ties and duplicates."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import plain
 import pytest
 import torch
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from sklearn.neighbors import NearestNeighbors
+from torch import Tensor
+from torch.nn import functional
 
-from doorstate.networks.ops import ball_query, gather_rows, knn, max_over, reduce_neighbours
+from doorstate.networks.ops import (
+    gather_rows,
+    linear_max,
+    max_over_points,
+    neighbour_max,
+    neighbour_sum,
+    with_moments,
+)
 
-# On a line, so that every distance is exact; farthest-point order does not matter here.
-LINE = torch.tensor([[[x, 0.0, 0.0] for x in (0.0, 0.125, 0.375, 0.0625, 0.25)]])
+
+def rows(*shape: int, seed: int = 0) -> Tensor:
+    return torch.randn(*shape, generator=torch.Generator().manual_seed(seed)).double()
 
 
-def cloud(*shape: int, seed: int = 0) -> torch.Tensor:
-    return torch.randn(*shape, generator=torch.Generator().manual_seed(seed))
+def assert_same(fast: Callable[..., Tensor], literal: Callable[..., Tensor], *inputs: Tensor) -> None:
+    """Same values and same gradients of every input, in float64 and, less closely, in float32."""
+    for dtype, tolerance in ((torch.float64, 1e-9), (torch.float32, 1e-4)):
+        results = []
+        for form in (fast, literal):
+            leaves = [x.to(dtype).detach().requires_grad_() for x in inputs]
+            out = form(*leaves)
+            weights = torch.linspace(-1, 2, out.numel(), dtype=dtype).view_as(out)
+            results.append([out, *torch.autograd.grad((out * weights).sum(), leaves)])
+        for got, expected in zip(*results, strict=True):
+            torch.testing.assert_close(got, expected, rtol=tolerance, atol=tolerance)
+
+
+def neighbours(batch: int, queries: int, points: int, k: int) -> Tensor:
+    return torch.randint(0, points, (batch, queries, k), generator=torch.Generator().manual_seed(1))
 
 
 def test_gather_rows_picks_rows_of_the_same_cloud() -> None:
-    values = cloud(3, 7, 4)
-    indices = torch.randint(0, 7, (3, 5, 2), generator=torch.Generator().manual_seed(1))
-    assert torch.equal(gather_rows(values, indices), plain.gather(values, indices))
+    indices = neighbours(3, 5, 7, 2)
+    assert_same(lambda x: gather_rows(x, indices), lambda x: plain.gather(x, indices), rows(3, 7, 4))
 
 
-@pytest.mark.parametrize("reduction", ["sum", "max"])
-def test_reduced_neighbours_equal_gathered_ones(reduction: str) -> None:
-    indices = torch.randint(0, 9, (2, 6, 4), generator=torch.Generator().manual_seed(1))
-    fast_values, plain_values = (cloud(2, 9, 5).double().requires_grad_() for _ in range(2))
-    fast = reduce_neighbours(fast_values, indices, "sum" if reduction == "sum" else "max")
-    gathered = plain.gather(plain_values, indices)
-    expected = gathered.sum(2) if reduction == "sum" else gathered.max(2).values
-    torch.testing.assert_close(fast, expected, rtol=0, atol=1e-12)
-    fast.square().sum().backward()
-    expected.square().sum().backward()
-    torch.testing.assert_close(fast_values.grad, plain_values.grad, rtol=0, atol=1e-12)
+def test_neighbour_sum_is_the_sum_of_gathered_rows() -> None:
+    indices = neighbours(2, 6, 9, 4)
+    indices[0, :, 0] = 3  # some points are nobody's neighbour, one is everybody's
+    indices[indices == 5] = 4
+    assert_same(lambda x: neighbour_sum(x, indices), lambda x: plain.gather(x, indices).sum(2), rows(2, 9, 5))
 
 
-def test_max_over_is_the_same_with_and_without_gradient() -> None:
-    values = cloud(2, 5, 3)
-    assert torch.equal(max_over(values, 1), max_over(values.clone().requires_grad_(), 1))
+@pytest.mark.parametrize("ties", [False, True])
+def test_neighbour_max_is_the_maximum_of_gathered_rows(ties: bool) -> None:
+    indices = neighbours(2, 6, 9, 4)
+    values = rows(2, 9, 5)
+    if ties:  # the first of equal neighbours gets the gradient, as of torch.max
+        values = values.round()
+    assert_same(lambda x: neighbour_max(x, indices), lambda x: plain.gather(x, indices).max(2).values, values)
+    assert torch.equal(neighbour_max(values, indices), plain.gather(values, indices).amax(2))
 
 
-def test_knn_agrees_with_scikit_learn() -> None:
-    points = cloud(2, 150, 3)
-    found = knn(points[:, :40], points, 9)
-    for b in range(2):
-        tree = NearestNeighbors(n_neighbors=9).fit(points[b].numpy())
-        assert (found[b].numpy() == tree.kneighbors(points[b, :40].numpy(), return_distance=False)).all()
+@pytest.mark.parametrize("count", [1, 32, 127, 128, 300])
+@pytest.mark.parametrize("ties", [False, True])
+def test_max_over_points_is_the_maximum(count: int, ties: bool) -> None:
+    values = rows(2, 3, count, 5).round() if ties else rows(2, 3, count, 5)
+    assert_same(max_over_points, lambda x: x.max(-2).values, values)
+    assert torch.equal(max_over_points(values), values.amax(-2))
 
 
-@pytest.mark.parametrize("dimensions", [3, 8])
-def test_knn_equals_its_plain_twin(dimensions: int) -> None:
-    points = cloud(2, 20, dimensions).double()
-    assert torch.equal(knn(points[:, :7], points, 6), plain.knn(points[:, :7], points, 6))
+def test_winner_of_signed_zeros() -> None:
+    values = torch.tensor([[[-0.0], [0.0], [-0.0]]], requires_grad=True)
+    max_over_points(values).sum().backward()
+    assert values.grad is not None
+    assert values.grad.sum() == 1
 
 
-def test_knn_of_more_queries_than_one_block() -> None:
-    points = cloud(1, 1500, 3)
-    squared = (points.unsqueeze(2) - points.unsqueeze(1)).square().sum(-1)
-    found = knn(points, points, 4)
-    torch.testing.assert_close(
-        squared.gather(2, found), squared.topk(4, largest=False).values, rtol=0, atol=1e-7
-    )
-    assert (found[0, :, 0] == torch.arange(1500)).all()
+@pytest.mark.parametrize("count", [20, 64, 192])
+def test_linear_max_is_the_maximum_of_the_linear_layer(count: int) -> None:
+    values = rows(3, count, 6)
+    values[:, -1] = values[:, 0]  # a duplicate point: the first gets the gradient
+    weight, bias = rows(10, 6, seed=1), rows(10, seed=2)
+    assert_same(linear_max, lambda x, w, b: functional.linear(x, w, b).max(1).values, values, weight, bias)
+    with torch.no_grad():
+        expected = functional.linear(values, weight, bias).amax(1)
+        torch.testing.assert_close(linear_max(values, weight, bias), expected)
 
 
-@pytest.mark.parametrize("dimensions", [3, 16])
-def test_a_query_comes_first_whatever_duplicates_it_has(dimensions: int) -> None:
-    points = cloud(2, 6, dimensions).repeat(1, 5, 1)  # every point five times
-    found = knn(points, points, 5)
-    assert (found[..., 0] == torch.arange(30)).all()
-    assert (found % 6 == (torch.arange(30) % 6).view(1, -1, 1)).all()
+def test_linear_max_without_a_gradient_of_the_rows() -> None:
+    values, weight = rows(2, 64, 3), rows(4, 3, seed=1).requires_grad_()
+    linear_max(values, weight, rows(4, seed=2)).sum().backward()
+    got, weight.grad = weight.grad, None
+    functional.linear(values, weight).amax(1).sum().backward()
+    torch.testing.assert_close(got, weight.grad)
 
 
-def test_a_foreign_query_is_not_taken_for_the_point_of_its_index() -> None:
-    points = torch.tensor([[[0.0, 0, 0], [1, 0, 0], [2, 0, 0]]])
-    query = torch.tensor([[[1.9, 0, 0]]])
-    assert knn(query, points, 3).tolist() == [[[2, 1, 0]]]
+def test_moments_and_their_gradient_join_that_of_the_rows() -> None:
+    values, weight = rows(70, 4) * torch.tensor([1, 2, 3, 0.1]) + 5, rows(3, 4, seed=1)
+
+    def fast(x: Tensor, w: Tensor) -> Tensor:
+        x, mean, covariance = with_moments(x)
+        return torch.cat([functional.linear(x, w).exp().flatten(), mean.square(), covariance.sin().flatten()])
+
+    def literal(x: Tensor, w: Tensor) -> Tensor:
+        covariance = x.T.cov(correction=0)
+        return torch.cat(
+            [functional.linear(x, w).exp().flatten(), x.mean(0).square(), covariance.sin().flatten()]
+        )
+
+    assert_same(fast, literal, values / 10, weight)
 
 
-def test_knn_returns_all_points_if_there_are_fewer_than_k() -> None:
-    points = cloud(1, 5, 3)
-    assert knn(points, points, 20).shape == (1, 5, 5)
-
-
-@pytest.mark.parametrize("far_m", [0.0, 100.0])
-def test_neighbours_in_feature_space_survive_a_large_offset(far_m: float) -> None:
-    points = cloud(1, 64, 16)
-    assert torch.equal(knn(points + far_m, points + far_m, 2), knn(points, points, 2))
-
-
-def test_neighbours_do_not_depend_on_autocast() -> None:
-    points, features = cloud(1, 300, 3), cloud(1, 300, 16)
-    near, ball, alike = knn(points, points, 8), ball_query(points, points, 0.5, 8), knn(features, features, 8)
-    with torch.autocast("cpu", dtype=torch.bfloat16):
-        assert torch.equal(knn(points, points, 8), near)
-        assert torch.equal(ball_query(points, points, 0.5, 8), ball)
-        assert torch.equal(knn(features, features, 8), alike)
-
-
-@pytest.mark.parametrize(
-    ("radius", "num_samples", "expected"),
-    [
-        (0.25, 4, [0, 1, 3, 0]),  # the point at exactly the radius is outside
-        (0.25, 2, [0, 1]),  # first in index order, not the nearest, 0 and 3
-        (1e-6, 3, [0, 0, 0]),
-        (9.0, 7, [0, 1, 2, 3, 4, 0, 0]),  # more slots than points
-    ],
-)
-def test_ball_query_by_hand(radius: float, num_samples: int, expected: list[int]) -> None:
-    assert ball_query(LINE[:, :1], LINE, radius, num_samples).tolist() == [[expected]]
-
-
-@settings(deadline=None, max_examples=25)
-@given(st.integers(0, 10**6), st.sampled_from([0.1, 0.5, 1.0, 3.0]), st.integers(1, 12))
-def test_ball_query_equals_its_plain_twin(seed: int, radius: float, num_samples: int) -> None:
-    points = (
-        cloud(2, 10, 3, seed=seed) * 4
-    ).round().double() / 4  # a grid: duplicates and distances at the edge
-    centres = points[:, :4]
-    expected = plain.ball_query(centres, points, radius, num_samples)
-    assert torch.equal(ball_query(centres, points, radius, num_samples), expected)
-
-
-def test_a_centre_is_at_zero_offset_in_its_own_ball() -> None:
-    points = cloud(2, 50, 3)
-    indices = ball_query(points[:, :8], points, 0.8, 50)
-    offsets = gather_rows(points, indices) - points[:, :8].unsqueeze(2)
-    own = indices == torch.arange(8).view(1, 8, 1)
-    assert own.any(-1).all()
-    assert (offsets[own] == 0).all()
+def test_moments_of_rows_far_from_zero_do_not_cancel() -> None:
+    values = rows(500, 3)
+    _, mean, covariance = with_moments((values + 1000).float())
+    torch.testing.assert_close(mean.double() - 1000, values.mean(0), rtol=0, atol=1e-4)
+    torch.testing.assert_close(covariance.double(), values.T.cov(correction=0), rtol=0, atol=1e-3)

@@ -10,8 +10,8 @@ import torch
 from torch import Tensor, nn
 
 from doorstate.errors import ConfigError
-from doorstate.networks.ops import knn
 from doorstate.networks.point2sequence import AREAS, Attention, LSTMCell, Point2Sequence
+from doorstate.networks.search import knn
 
 
 def clouds(batch: int = 2, num_points: int = 128) -> Tensor:
@@ -83,16 +83,16 @@ def test_attention_written_out() -> None:
 
 def test_areas_are_nested_and_ordered(network: Point2Sequence) -> None:
     points = clouds(1, 500)
-    found = network.neighbours(points)
+    found = network.neighbourhoods(points)[0]
     assert found.shape == (1, 384, 128)
     assert torch.equal(found, knn(points[:, :384], points, 128))
     assert list(AREAS) == [16, 32, 64, 128]
     with torch.no_grad():
-        sequence = network.sequence(points)
+        sequence = network.sequence(points, *network.neighbourhoods(points))
         assert sequence.shape == (1, 384, 4, 128)
         for t, (size, mlp) in enumerate(zip(AREAS, network.mlps, strict=True)):
             offsets = points[0, found[0, 5, :size]] - points[0, 5]  # one region by hand
-            torch.testing.assert_close(sequence[0, 5, t], mlp(offsets))
+            torch.testing.assert_close(sequence[0, 5, t], mlp(offsets[None])[0])
 
 
 def test_sequence_is_read_from_small_to_large(network: Point2Sequence) -> None:
@@ -122,7 +122,7 @@ def test_attention_reaches_the_output_unless_as_released(region_feature: str) ->
 def test_region_feature(region_feature: str) -> None:
     network = Point2Sequence(region_feature=region_feature).eval()
     points = clouds()
-    memory, query = network.encode(network.sequence(points))
+    memory, query = network.encode(network.sequence(points, *network.neighbourhoods(points)))
     region = network.attention(memory, query) if region_feature == "attention" else query
     expected = network.globals(points, network.region(region))
     torch.testing.assert_close(network.features(points), expected)
@@ -131,15 +131,18 @@ def test_region_feature(region_feature: str) -> None:
 def test_dilated_areas_shrink_when_points_are_few() -> None:
     network = Point2Sequence(dilation=4)
     many, few = clouds(1, 600), clouds(1, 300)
-    assert torch.equal(network.neighbours(many), knn(many[:, :384], many, 512)[..., ::4])
-    assert torch.equal(network.neighbours(few), knn(few, few, 256)[..., ::2])
+    assert torch.equal(network.neighbourhoods(many)[0], knn(many[:, :384], many, 512)[..., ::4])
+    assert torch.equal(network.neighbourhoods(few)[0], knn(few, few, 256)[..., ::2])
 
 
 def test_a_shift_reaches_only_the_last_level(network: Point2Sequence) -> None:
     network = copy.deepcopy(network).double()
     points = clouds().double()
     moved = points + torch.tensor([0.5, -1.0, 2.0])
-    torch.testing.assert_close(network.sequence(points), network.sequence(moved))
+    torch.testing.assert_close(
+        network.sequence(points, *network.neighbourhoods(points)),
+        network.sequence(moved, *network.neighbourhoods(moved)),
+    )
     assert (network(points) - network(moved)).abs().max() > 1e-3
 
 

@@ -8,8 +8,8 @@ import pytest
 import torch
 from torch import Tensor, nn
 
-from doorstate.networks.ops import knn
 from doorstate.networks.pointcnn import Level, PointCNN, XConv
+from doorstate.networks.search import knn
 
 
 def clouds(batch: int = 2, num_points: int = 128) -> Tensor:
@@ -25,7 +25,7 @@ def test_x_conv_equals_its_plain_twin(dtype: torch.dtype, num_features: int) -> 
     indices = module.neighbours(points)
 
     def fast(module: nn.Module, leaves: list[Tensor]) -> Tensor:
-        return module(leaves[0], leaves[1] if num_features else None)[1]
+        return module(leaves[0], leaves[1] if num_features else None, indices)[1]
 
     def literal(module: nn.Module, leaves: list[Tensor]) -> Tensor:
         return plain.x_conv(leaves[0], leaves[1] if num_features else None, indices, module)
@@ -42,8 +42,9 @@ def test_shapes_of_neighbours_matrices_and_features() -> None:
     points, features = clouds(1, 1024), None
     for level in network.levels:
         level.transform.register_forward_hook(lambda module, args, out: matrices.append(out.shape))
-        neighbours.append(level.neighbours(points).shape)
-        points, features = level(points, features)
+        indices = level.neighbours(points)
+        neighbours.append(indices.shape)
+        points, features = level(points, features, indices)
         channels.append(features.shape[-1])
         centres.append(points)
     assert neighbours == [(1, 1024, 8), (1, 384, 12), (1, 128, 16), (1, 128, 16)]
@@ -98,7 +99,8 @@ def test_global_branch_sees_where_the_representatives_are() -> None:
     level = PointCNN().double().eval().levels[3]
     points = clouds().double()
     features = torch.randn(2, 128, 192, generator=torch.Generator().manual_seed(1)).double()
-    here, there = level(points, features)[1], level(points + 1, features)[1]
+    indices = level.neighbours(points)
+    here, there = (level(points + shift, features, indices)[1] for shift in (0, 1))
     torch.testing.assert_close(here[..., 96:], there[..., 96:])
     assert (here[..., :96] - there[..., :96]).abs().max() > 0.1
 
@@ -136,8 +138,9 @@ def test_representatives_are_a_prefix_so_only_its_order_matters() -> None:
 
 def test_coarser_first_level() -> None:
     network = PointCNN(num_representatives=(256, 384, 128, 128), dilations=(4, 2, 2, 3)).eval()
-    points, features = network.levels[0](clouds(1, 600), None)
+    first, second, *_ = network.neighbourhoods(clouds(1, 600))
+    points, features = network.levels[0](clouds(1, 600), None, first)
     assert points.shape == (1, 256, 3)
-    points, _ = network.levels[1](points, features)
+    points, _ = network.levels[1](points, features, second)
     assert points.shape == (1, 256, 3)  # no more points than there are
     assert network(clouds(1, 600)).shape == (1, 3)

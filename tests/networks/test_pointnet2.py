@@ -41,7 +41,8 @@ def test_set_abstraction_equals_its_plain_twin(dtype: torch.dtype, num_features:
     features = torch.randn(2, 40, num_features, generator=torch.Generator().manual_seed(1))
 
     def fast(module: nn.Module, leaves: list[Tensor]) -> Tensor:
-        centres, pooled = module(leaves[0], leaves[1] if num_features else None)
+        balls = module.neighbourhoods(leaves[0])
+        centres, pooled = module(leaves[0], leaves[1] if num_features else None, balls)
         return torch.cat([centres, pooled], dim=-1)
 
     def literal(module: nn.Module, leaves: list[Tensor]) -> Tensor:
@@ -61,11 +62,13 @@ def test_set_abstraction_equals_its_plain_twin(dtype: torch.dtype, num_features:
 @pytest.mark.parametrize(("variant", "channels"), [("ssg", (128, 256)), ("msg", (320, 640))])
 def test_shapes_of_the_levels(variant: str, channels: tuple[int, int]) -> None:
     network = PointNet2(variant=variant).eval()
+    balls = network.neighbourhoods(clouds(1, 600))
+    first, second = balls[: len(balls) // 2], balls[len(balls) // 2 :]
     with torch.no_grad():
-        centres, features = network.level1(clouds(1, 600), None)
+        centres, features = network.level1(clouds(1, 600), None, first)
         assert centres.shape == (1, 512, 3)
         assert features.shape == (1, 512, channels[0])
-        centres, features = network.level2(centres, features)
+        centres, features = network.level2(centres, features, second)
         assert features.shape == (1, 128, channels[1])
         assert network.level3(centres, features).shape == (1, 1024)
     assert torch.equal(centres, clouds(1, 600)[:, :128])  # the prefix, in order
@@ -84,7 +87,10 @@ def test_radii_are_in_the_unit_of_the_points() -> None:
     metric.load_state_dict(unit.state_dict())
     with torch.no_grad():
         metric.level1.mlps[0].mlp.first.weight /= 3  # three input channels, all coordinates
-        small, large = unit.level1(clouds(), None)[1], metric.level1(clouds() * 3, None)[1]
+        small, large = (
+            network.level1(points, None, network.level1.neighbourhoods(points))[1]
+            for network, points in ((unit, clouds()), (metric, clouds() * 3))
+        )
     torch.testing.assert_close(small, large)
 
 
@@ -92,7 +98,10 @@ def test_a_shift_reaches_only_the_last_level() -> None:
     network = PointNet2().double().eval()
     points = clouds().double()
     moved = points + torch.tensor([0.5, -1.0, 2.0])
-    torch.testing.assert_close(network.level1(points, None)[1], network.level1(moved, None)[1])
+    here, there = (
+        network.level1(cloud, None, network.level1.neighbourhoods(cloud))[1] for cloud in (points, moved)
+    )
+    torch.testing.assert_close(here, there)
     assert (network(points) - network(moved)).abs().max() > 1e-3
 
 

@@ -12,6 +12,9 @@ from torch.nn import functional
 from doorstate.errors import CloudContentError
 from doorstate.networks.ops import at_least_float32
 
+Neighbourhoods = tuple[Tensor, ...]
+"""Indices (B, ...) into a cloud's points that depend on coordinates alone."""
+
 
 class PointNetwork(nn.Module, ABC):
     """Classifier of point clouds stored in farthest-point order.
@@ -22,20 +25,34 @@ class PointNetwork(nn.Module, ABC):
 
     min_points: ClassVar[int] = 128
     """Fewest points per cloud."""
+    neighbours_keep_under_scale: ClassVar[bool] = True
+    """Whether `neighbourhoods` of a cloud stay the same when it is scaled; they always do when it is turned."""
     feature_size: int
     """Channels of `features`."""
     head: nn.Module
     """From features to logits."""
 
+    def neighbourhoods(self, points: Tensor) -> Neighbourhoods:
+        """Neighbours that the network looks for among the coordinates, so that they can be kept for the next epoch.
+
+        Args:
+            points: (B, N, 3) as in `forward`.
+
+        Returns:
+            (B, ...) int64 indices, as `forward` and `training_loss` take them.
+        """
+        return ()
+
     @abstractmethod
-    def features(self, points: Tensor) -> Tensor:
+    def features(self, points: Tensor, neighbourhoods: Neighbourhoods | None = None) -> Tensor:
         """(B, F) global features of (B, N, 3) points."""
 
-    def forward(self, points: Tensor) -> Tensor:
+    def forward(self, points: Tensor, neighbourhoods: Neighbourhoods | None = None) -> Tensor:
         """Classify clouds.
 
         Args:
             points: (B, N, 3) centred coordinates in farthest-point order, N >= `min_points`.
+            neighbourhoods: of these points, if they are known; otherwise they are looked for.
 
         Returns:
             (B, num_classes) logits, float32 also under autocast.
@@ -44,10 +61,14 @@ class PointNetwork(nn.Module, ABC):
             CloudContentError: The points have another shape, or there are too few.
         """
         self.check(points)
-        return at_least_float32(self.head(self.features(points)))
+        return at_least_float32(self.head(self.features(points, neighbourhoods)))
 
     def training_loss(
-        self, points: Tensor, labels: Tensor, label_smoothing: float = 0.0
+        self,
+        points: Tensor,
+        labels: Tensor,
+        label_smoothing: float = 0.0,
+        neighbourhoods: Neighbourhoods | None = None,
     ) -> tuple[Tensor, Tensor]:
         """Loss the network is trained with.
 
@@ -56,11 +77,12 @@ class PointNetwork(nn.Module, ABC):
             labels: (B,) int64 classes.
             label_smoothing: eps of 1 - eps + eps/C for the true class and eps/C for each other of C classes.
                 (The 1 - eps and eps/(C - 1) of DGCNN's authors is the same with eps * C/(C - 1).)
+            neighbourhoods: as in `forward`.
 
         Returns:
             Scalar loss and (B, num_classes) logits.
         """
-        logits = self(points)
+        logits = self(points, neighbourhoods)
         return functional.cross_entropy(logits, labels, label_smoothing=label_smoothing), logits
 
     def check(self, points: Tensor) -> None:

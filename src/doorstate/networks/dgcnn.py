@@ -7,9 +7,10 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from doorstate.networks.base import PointNetwork
+from doorstate.networks.base import Neighbourhoods, PointNetwork
 from doorstate.networks.layers import RowBatchNorm, set_batchnorm
-from doorstate.networks.ops import full_precision, knn, max_over, reduce_neighbours
+from doorstate.networks.ops import full_precision, gather_rows, max_over_points, neighbour_max, neighbour_sum
+from doorstate.networks.search import knn, spatial_order
 
 _SLOPE = 0.2
 
@@ -17,9 +18,8 @@ _SLOPE = 0.2
 class EdgeConv(nn.Module):
     """max over neighbours j of LeakyReLU(BatchNorm(W [x_j - x_i; x_i])), without building the edges' inputs.
 
-    With W = [A, B], W [x_j - x_i; x_i] = A x_j + (B - A) x_i: two products per point. BatchNorm and LeakyReLU
-    are monotone per channel: the maximum is taken of A x_j, the minimum where the norm's scale is negative.
-    The batch statistics stay those of all edges.
+    The batch's statistics are known from the edges' mean and covariance, so BatchNorm folds into W = [A, B], and
+    W [x_j - x_i; x_i] = A x_j + (B - A) x_i: two products per point. LeakyReLU is monotone and follows the maximum.
     """
 
     def __init__(self, in_channels: int, out_channels: int) -> None:
@@ -29,41 +29,40 @@ class EdgeConv(nn.Module):
 
     def forward(self, features: Tensor, indices: Tensor) -> Tensor:
         """(B, N, C_out) of (B, N, C) features and (B, N, k) neighbours."""
-        difference, own = self.linear.weight.chunk(2, dim=1)
+        moments = edge_moments(features, indices) if self.training else None
+        weight, bias = self.norm.fold(self.linear, moments, count=indices.numel())
+        difference, own = weight.chunk(2, dim=1)
         neighbour = functional.linear(features, difference)  # (B, N, C_out): A x
-        centre = functional.linear(features, own - difference)  # (B, N, C_out): (B - A) x
-        sign = torch.where(self.norm.weight.detach() < 0, -1.0, 1.0).to(neighbour.dtype)
-        edge = reduce_neighbours(neighbour * sign, indices, "max") * sign + centre
-        if self.training:
-            mean, variance = edge_statistics(neighbour, centre, indices)
-            edge = self.norm.normalize(edge, mean, variance, count=indices.numel())
-        else:
-            edge = self.norm(edge)
-        return functional.leaky_relu(edge, _SLOPE)
+        centre = functional.linear(features, own - difference, bias)  # (B, N, C_out): (B - A) x
+        return functional.leaky_relu(neighbour_max(neighbour, indices) + centre, _SLOPE)
 
 
-def edge_statistics(neighbour: Tensor, centre: Tensor, indices: Tensor) -> tuple[Tensor, Tensor]:
-    """Mean and variance of u_j + v_i over all edges of all clouds, without the edges.
+def edge_moments(features: Tensor, indices: Tensor) -> tuple[Tensor, Tensor]:
+    """Mean and covariance of [x_j - x_i; x_i] over all edges of all clouds, without the edges.
 
     Args:
-        neighbour: (B, N, C) u.
-        centre: (B, N, C) v.
+        features: (B, N, C) x.
         indices: (B, N, k) neighbours j of each point i.
 
     Returns:
-        (C,) mean and (C,) variance divided by the number of edges.
+        (2C,) mean and (2C, 2C) covariance divided by the number of edges.
     """
-    batch, num_points, k = indices.shape
-    share = neighbour.new_full((1,), 1 / indices.numel()).expand(batch, num_points * k)
-    share = neighbour.new_zeros(batch, num_points).scatter_add(1, indices.flatten(1), share)
-    share = share.unsqueeze(-1)  # (B, N, 1) of the edges that end in a point
-    neighbour_mean = (share * neighbour).sum(dim=(0, 1))
-    centre_mean = centre.mean(dim=(0, 1))
-    u, v = neighbour - neighbour_mean, centre - centre_mean  # centred, so that the squares do not cancel
-    neighbour_sum = reduce_neighbours(u, indices, "sum")  # (B, N, C)
-    variance = (share * u.square()).sum(dim=(0, 1)) + v.square().mean(dim=(0, 1))
-    variance = variance + 2 * (v * neighbour_sum).mean(dim=(0, 1)) / k
-    return neighbour_mean + centre_mean, variance.clamp_min(0)
+    each = features.new_full((1,), 1 / indices.numel()).expand(len(indices), indices[0].numel())
+    share = (
+        features.new_zeros(indices.shape[:2]).scatter_add_(1, indices.flatten(1), each).view(-1, 1)
+    )  # (B * N, 1) of all edges
+    flat = features.flatten(0, 1)
+    mean = flat.mean(0)
+    flat = flat - mean  # centred, so that the squares do not cancel
+    around = neighbour_sum(flat.view_as(features), indices).flatten(0, 1)  # (B * N, C): sum of x_j
+    mean_end = (share * flat).sum(0)  # of x_j, where the mean of x_i is zero
+    end_end = (share * flat).T @ flat
+    end_own = around.T @ flat / indices.numel()
+    own_own = flat.T @ flat / len(flat)
+    step_own = end_own - own_own
+    step_step = end_end - end_own - step_own.T - torch.outer(mean_end, mean_end)
+    covariance = torch.cat([torch.cat([step_step, step_own], 1), torch.cat([step_own.T, own_own], 1)])
+    return torch.cat([mean_end, mean]), covariance
 
 
 class DGCNN(PointNetwork):
@@ -97,19 +96,34 @@ class DGCNN(PointNetwork):
         )
         set_batchnorm(self, eps=batchnorm_eps)
 
-    def edge_features(self, points: Tensor) -> list[Tensor]:
+    def neighbourhoods(self, points: Tensor) -> Neighbourhoods:
+        """(B, N) order in which near points follow each other, and (B, N, k) neighbours in that order."""
+        order = spatial_order(points)
+        points = gather_rows(points, order)
+        return order, knn(points, points, self.k, in_order=True)
+
+    def edge_features(self, points: Tensor, neighbours: Tensor) -> list[Tensor]:
         """(B, N, 64), (B, N, 64), (B, N, 128) and (B, N, 256) outputs of the edge convolutions.
 
         In full precision: the factored product subtracts what bfloat16 could no longer tell apart.
+
+        Args:
+            points: (B, N, 3) in spatial order.
+            neighbours: (B, N, k) of these points.
         """
-        outputs, features = [], points
+        outputs: list[Tensor] = []
+        features = points
         with full_precision(points):
             for conv in self.convs:
-                features = conv(features, knn(features, features, self.k))
+                if outputs:
+                    neighbours = knn(features, features, self.k, in_order=True)
+                features = conv(features, neighbours)
                 outputs.append(features)
         return outputs
 
-    def features(self, points: Tensor) -> Tensor:
-        """(B, 2048) maximum and mean over the points."""
-        rows = self.aggregate(torch.cat(self.edge_features(points), dim=-1))  # (B, N, 1024)
-        return torch.cat([max_over(rows, dim=1), rows.mean(dim=1)], dim=-1)
+    def features(self, points: Tensor, neighbourhoods: Neighbourhoods | None = None) -> Tensor:
+        """(B, 2048) maximum and mean over the points, whatever their order."""
+        order, neighbours = neighbourhoods or self.neighbourhoods(points)
+        edges = self.edge_features(gather_rows(points, order), neighbours)
+        rows = self.aggregate(torch.cat(edges, dim=-1))  # (B, N, 1024)
+        return torch.cat([max_over_points(rows), rows.mean(dim=1)], dim=-1)

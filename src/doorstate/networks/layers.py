@@ -5,12 +5,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import cast
 
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from doorstate.networks.ops import full_precision, gather_rows, max_over
+from doorstate.networks.ops import (
+    autocast_type,
+    full_precision,
+    gather_rows,
+    linear_max,
+    max_over_points,
+    with_moments,
+)
+
+_MANY_POINTS = 256  # from here on most rows have no maximum, and a gradient only of those that do is cheaper
 
 
 class RowBatchNorm(nn.BatchNorm1d):
@@ -24,21 +34,64 @@ class RowBatchNorm(nn.BatchNorm1d):
     def forward(self, rows: Tensor) -> Tensor:
         return super().forward(rows.reshape(-1, self.num_features)).view(rows.shape)
 
-    def normalize(self, rows: Tensor, mean: Tensor, variance: Tensor, count: int) -> Tensor:
-        """Normalise with batch statistics found elsewhere, and let the running statistics follow them.
+    def after(self, linear: nn.Linear, rows: Tensor) -> Tensor:
+        """Normalised outputs of a linear layer; a bias cancels against the batch's mean, and is left out."""
+        if not self.training:
+            weight, bias = self.fold(linear)
+            return functional.linear(rows, weight, bias)
+        out = functional.linear(rows, linear.weight)
+        return self(out) if linear.bias is None else self.without_bias(out, linear.bias)
 
-        Args:
-            rows: (B, ..., C).
-            mean: (C,) of the batch.
-            variance: (C,) of the batch, divided by count.
-            count: number of rows the statistics are of.
-        """
+    def without_bias(self, rows: Tensor, bias: Tensor) -> Tensor:
+        """Normalise rows that lack a bias in training; only the running mean needs it, and its gradient is zero."""
+        running_mean = self.running_mean.clone()  # torch keeps it for the backward pass: it must not change
+        out = functional.batch_norm(
+            rows.reshape(-1, self.num_features),
+            running_mean,
+            self.running_var,
+            self.weight,
+            self.bias + 0 * bias,
+            training=True,
+            momentum=self.momentum,
+            eps=self.eps,
+        )
         with torch.no_grad():
             self.num_batches_tracked += 1
-            self.running_mean.lerp_(mean, self.momentum)
-            self.running_var.lerp_(variance * (count / (count - 1)), self.momentum)
-        scale = self.weight * torch.rsqrt(variance + self.eps)
-        return (rows - mean) * scale + self.bias
+            torch.add(running_mean, bias, alpha=self.momentum, out=self.running_mean)
+        return out.view(rows.shape)
+
+    def fold(
+        self, linear: nn.Linear, moments: tuple[Tensor, Tensor] | None = None, count: int = 0
+    ) -> tuple[Tensor, Tensor]:
+        """Weight and bias of one linear layer that equals `linear` followed by this normalisation.
+
+        The outputs of W x + b have the mean W m + b and the variance diag(W S W^T), where m and S are mean and
+        covariance of x: the batch's statistics are known before any output is.
+
+        Args:
+            linear: the layer before.
+            moments: (C,) mean and (C, C) covariance of the batch's inputs; None takes the running statistics.
+            count: number of inputs the moments are of.
+
+        Returns:
+            (C', C) and (C',), at least float32.
+        """
+        weight = linear.weight
+        bias = torch.zeros_like(self.bias) if linear.bias is None else linear.bias
+        with full_precision(weight):
+            mean, variance = self.running_mean, self.running_var
+            if moments is not None:
+                mean = weight @ moments[0] + bias
+                variance = ((weight @ moments[1]) * weight).sum(1).clamp_min(0)
+                self._follow(mean, variance, count)
+            scale = self.weight * torch.rsqrt(variance + self.eps)
+            return weight * scale.unsqueeze(1), self.bias + scale * (bias - mean)
+
+    @torch.no_grad()
+    def _follow(self, mean: Tensor, variance: Tensor, count: int) -> None:
+        self.num_batches_tracked += 1
+        self.running_mean.lerp_(mean, self.momentum)
+        self.running_var.lerp_(variance * (count / (count - 1)), self.momentum)
 
 
 def set_batchnorm(network: nn.Module, eps: float | None = None, momentum: float | None = None) -> None:
@@ -63,18 +116,23 @@ def glorot(layer: nn.Linear) -> nn.Linear:
     return layer
 
 
-def dense(in_channels: int, out_channels: int) -> nn.Sequential:
+class Dense(nn.Sequential):
     """Linear, batch normalisation, ReLU; the bias is kept, as in the originals."""
-    linear = glorot(nn.Linear(in_channels, out_channels))
-    return nn.Sequential(linear, RowBatchNorm(out_channels), nn.ReLU())
+
+    def __init__(self, in_channels: int, out_channels: int) -> None:
+        super().__init__(glorot(nn.Linear(in_channels, out_channels)), RowBatchNorm(out_channels), nn.ReLU())
+
+    def forward(self, rows: Tensor) -> Tensor:
+        linear, norm = cast(nn.Linear, self[0]), cast(RowBatchNorm, self[1])
+        return norm.after(linear, rows).relu_()
 
 
 def classification_head(in_channels: int, num_classes: int, dropout: float) -> nn.Sequential:
     """Two dense layers of 512 and 256 with dropout, then logits."""
     return nn.Sequential(
-        dense(in_channels, 512),
+        Dense(in_channels, 512),
         nn.Dropout(dropout),
-        dense(512, 256),
+        Dense(512, 256),
         nn.Dropout(dropout),
         glorot(nn.Linear(256, num_classes)),
     )
@@ -91,7 +149,11 @@ class PointLinear(nn.Linear):
         glorot(self)
 
     def forward(
-        self, offsets: Tensor, features: Tensor | None = None, indices: Tensor | None = None
+        self,
+        offsets: Tensor,
+        features: Tensor | None = None,
+        indices: Tensor | None = None,
+        folded: tuple[Tensor, Tensor | None] | None = None,
     ) -> Tensor:
         """Apply the layer, optionally to neighbourhoods.
 
@@ -99,15 +161,18 @@ class PointLinear(nn.Linear):
             offsets: (B, ..., 3) coordinates, or coordinates relative to a centre.
             features: (B, N, C) features of the points, if the layer has any.
             indices: (B, ...) the point each offset belongs to; without it, offsets are the N points.
+            folded: weight and bias to use instead of its own.
 
         Returns:
-            (B, ..., out_channels).
+            (B, ..., out_channels), rounded to the type autocast asks for only at the end.
         """
+        weight, bias = folded or (self.weight, self.bias)
+        kind = autocast_type(offsets)
         with full_precision(offsets):
-            out = functional.linear(offsets, self.weight[:, :3], self.bias)
+            out = functional.linear(offsets, weight[:, :3], bias).to(kind)
         if features is None:
             return out
-        projected = functional.linear(features, self.weight[:, 3:])  # (B, N, out)
+        projected = functional.linear(features, weight[:, 3:]).to(kind)  # (B, N, out)
         return out + (projected if indices is None else gather_rows(projected, indices))
 
 
@@ -118,14 +183,19 @@ class PointMLP(nn.Module):
         super().__init__()
         self.first = PointLinear(num_features, channels[0])
         self.norm = RowBatchNorm(channels[0])
-        self.rest = nn.Sequential(*[dense(a, b) for a, b in pairwise(channels)])
+        self.rest = nn.Sequential(*[Dense(a, b) for a, b in pairwise(channels)])
 
     def forward(
         self, offsets: Tensor, features: Tensor | None = None, indices: Tensor | None = None
     ) -> Tensor:
         """Same arguments as `PointLinear.forward`; returns (B, ..., channels[-1])."""
-        rows: Tensor = self.rest(torch.relu(self.norm(self.first(offsets, features, indices))))
-        return rows
+        if self.training:
+            rows = self.first(offsets, features, indices, (self.first.weight, None))
+            rows = self.norm.without_bias(rows, self.first.bias)
+        else:
+            rows = self.first(offsets, features, indices, self.norm.fold(self.first))
+        out: Tensor = self.rest(rows.relu_())
+        return out
 
 
 class DenseMax(nn.Module):
@@ -138,7 +208,19 @@ class DenseMax(nn.Module):
 
     def forward(self, rows: Tensor) -> Tensor:
         # ReLU is monotone, so it may follow the maximum, where there are K times fewer rows.
-        return torch.relu(max_over(self.norm(self.linear(rows)), dim=-2))
+        return self._largest(rows).relu()
+
+    def _largest(self, rows: Tensor) -> Tensor:
+        groups = rows.flatten(0, -3)  # (G, K, C)
+        shape = (*rows.shape[:-2], -1)
+        if not self.training:
+            return linear_max(groups, *self.norm.fold(self.linear)).view(shape)
+        if groups.shape[1] < _MANY_POINTS:
+            return max_over_points(self.norm.after(self.linear, rows))
+        groups = groups.to(autocast_type(groups))
+        flat, *moments = with_moments(groups.flatten(0, 1))
+        folded = self.norm.fold(self.linear, (moments[0], moments[1]), count=len(flat))
+        return linear_max(flat.view_as(groups), *folded).view(shape)
 
 
 class PooledMLP(nn.Module):

@@ -1,20 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Neighbourhoods of points: gathering rows, nearest neighbours, balls.
+"""Operations on rows that torch has no quick form of: gathers, maxima, moments; each with its own gradient.
 
-Coordinates stay in full precision even under autocast; no gradient flows through a choice of neighbours.
+A plain twin of each is in the tests. Work is done on pieces that stay in a core's cache.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, nullcontext
-from typing import Literal
+from typing import Any
 
 import torch
 from torch import Tensor
+from torch.autograd.function import once_differentiable
 from torch.nn import functional
 
-_DISTANCES_PER_BLOCK = 2**19  # per cloud: 2 MiB of float32 stay in a core's cache
+_VALUES_PER_PIECE = 2**18  # 1 MiB of float32
+_GROUP = 64  # points of which only the largest are compared further
 
 
 def full_precision(tensor: Tensor) -> AbstractContextManager[object]:
@@ -26,6 +28,12 @@ def full_precision(tensor: Tensor) -> AbstractContextManager[object]:
 def at_least_float32(values: Tensor) -> Tensor:
     """Values as float32, or float64 if they are that already."""
     return values.to(torch.promote_types(values.dtype, torch.float32))
+
+
+def autocast_type(tensor: Tensor) -> torch.dtype:
+    """Type that autocast would compute a product with this tensor in."""
+    device = tensor.device.type
+    return torch.get_autocast_dtype(device) if torch.is_autocast_enabled(device) else tensor.dtype
 
 
 def gather_rows(values: Tensor, indices: Tensor) -> Tensor:
@@ -42,20 +50,68 @@ def gather_rows(values: Tensor, indices: Tensor) -> Tensor:
     return values.flatten(0, 1).index_select(0, rows).view(*indices.shape, values.shape[-1])
 
 
-def reduce_neighbours(values: Tensor, indices: Tensor, reduction: Literal["sum", "max"]) -> Tensor:
-    """Sum or maximum of each point's neighbours, without a tensor of all neighbours.
+def neighbour_sum(values: Tensor, indices: Tensor) -> Tensor:
+    """Sum over each point's neighbours: (B, M, C) of (B, N, C) values and (B, M, k) indices."""
+    return _sum_neighbours(values, indices)
+
+
+def neighbour_max(values: Tensor, indices: Tensor) -> Tensor:
+    """Maximum over each point's neighbours: (B, M, C) of (B, N, C) values and (B, M, k) indices.
+
+    The gradient goes to the first neighbour that has the maximum.
+    """
+    if torch.compiler.is_exporting():
+        return gather_rows(values, indices).amax(2)
+    if not _wants_gradient(values):
+        return _neighbour_amax(values, indices)
+    return _max_neighbours(values, indices)
+
+
+def max_over_points(values: Tensor) -> Tensor:
+    """Maximum over the axis before the last; its gradient goes to the first point that has it."""
+    if torch.compiler.is_exporting() or not _wants_gradient(values):
+        return values.amax(-2)
+    return _max_points(values)
+
+
+def linear_max(rows: Tensor, weight: Tensor, bias: Tensor) -> Tensor:
+    """max over points of W x + b, whose gradient is spread no wider than the points that have a maximum.
 
     Args:
-        values: (B, N, C).
-        indices: (B, M, k) int64 row numbers within the same cloud.
-        reduction: "sum" or "max"; the gradient of a maximum goes to one neighbour.
+        rows: (G, N, C).
+        weight: (C', C).
+        bias: (C',).
 
     Returns:
-        (B, M, C).
+        (G, C') in the type autocast asks for.
     """
-    bags = _flat_rows(values, indices).flatten(0, 1)  # (B * M, k)
-    reduced = functional.embedding_bag(bags, values.flatten(0, 1), mode=reduction)
-    return reduced.view(*indices.shape[:2], values.shape[-1])
+    kind = autocast_type(rows)
+    with full_precision(rows):
+        rows, weight, bias = rows.to(kind), weight.to(kind), bias.to(kind)
+        if torch.compiler.is_exporting():
+            return functional.linear(rows, weight).amax(1) + bias
+        if not _wants_gradient(rows, weight):
+            return _linear_amax(rows, weight) + bias
+        return _max_linear(rows, weight) + bias
+
+
+def with_moments(rows: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    """Rows as they are, their mean and their covariance, sharing one gradient.
+
+    The rows' gradient is that of whatever uses them with the moments' added in place: give the rows returned to one
+    operation that makes a fresh gradient, and to no other.
+
+    Args:
+        rows: (R, C).
+
+    Returns:
+        (R, C) rows, (C,) mean and (C, C) covariance divided by R, both at least float32.
+    """
+    return _moments(rows)
+
+
+def _wants_gradient(*tensors: Tensor) -> bool:
+    return torch.is_grad_enabled() and any(tensor.requires_grad for tensor in tensors)
 
 
 def _flat_rows(values: Tensor, indices: Tensor) -> Tensor:
@@ -65,89 +121,173 @@ def _flat_rows(values: Tensor, indices: Tensor) -> Tensor:
     return indices + first_row.view(-1, *[1] * (indices.dim() - 1))
 
 
-def max_over(values: Tensor, dim: int) -> Tensor:
-    """Maximum along one axis; its gradient goes to one arg-max, found only when a gradient is wanted."""
-    return values.max(dim).values if values.requires_grad else values.amax(dim)
+def _pieces(count: int, values_each: int) -> Iterator[slice]:
+    size = max(1, _VALUES_PER_PIECE // values_each)
+    return (slice(start, min(start + size, count)) for start in range(0, count, size))
 
 
-def knn(query: Tensor, points: Tensor, k: int) -> Tensor:
-    """Nearest neighbours, nearest first.
+def _first_winner(values: Tensor) -> tuple[Tensor, Tensor]:
+    """Maximum over axis 1 of (G, K, C) values and the first index that has it.
 
-    A query equal to the point of the same index is that point: it comes first, whatever duplicates it has
-    (all networks query a prefix of the points).
-
-    Args:
-        query: (B, M, D), M <= N.
-        points: (B, N, D).
-        k: number of neighbours; at most N are returned.
-
-    Returns:
-        (B, M, min(k, N)) int64 indices into points.
+    Three vectorised passes: torch.max with indices over an axis that is not the last compares one by one.
     """
-    k = min(k, points.shape[1])
-    found = []
-    with full_precision(points):
-        for start, block, distances in _distance_blocks(query, points):
-            same_index = torch.arange(start, start + block.shape[1], device=points.device)  # (m,)
-            same = (block == points[:, start : start + block.shape[1]]).all(-1, keepdim=True)  # (B, m, 1)
-            column = same_index.view(1, -1, 1).expand_as(same)
-            own = torch.where(same, -torch.inf, distances.gather(2, column))
-            found.append(distances.scatter_(2, column, own).topk(k, largest=False).indices)
-    return torch.cat(found, dim=1)
+    num_points = values.shape[1]
+    largest = values.amax(1, keepdim=True)
+    whole = {2: torch.int16, 4: torch.int32, 8: torch.int64}[
+        values.element_size()
+    ]  # equal bits are told quicker
+    kind = torch.int8 if num_points < 2**7 else torch.int16 if num_points < 2**15 else torch.int32
+    from_end = torch.arange(num_points, 0, -1, dtype=kind, device=values.device).view(1, -1, 1)
+    has_it = (values.view(whole) == largest.view(whole)).view(torch.int8)
+    return largest.squeeze(1), num_points - (has_it * from_end).amax(1)
 
 
-def ball_query(centres: Tensor, points: Tensor, radius: float, num_samples: int) -> Tensor:
-    """First points, in index order, strictly closer than a radius (PointNet++ grouping).
-
-    Args:
-        centres: (B, M, 3), each also one of the points, so that no ball is empty.
-        points: (B, N, 3).
-        radius: in the unit of the points.
-        num_samples: slots per centre; slots left over repeat the first hit.
-
-    Returns:
-        (B, M, num_samples) int64 indices into points.
-    """
-    num_points = points.shape[1]
-    # Indices as float32 (exact up to 2^24): topk on floats is twice as fast as on integers.
-    index = torch.arange(num_points, device=points.device, dtype=torch.float32)
-    k = min(num_samples, num_points)
-    found = []
-    for _, _, squared in _distance_blocks(centres, points):
-        hits = torch.where(squared < radius**2, index, float(num_points))
-        found.append(hits.topk(k, largest=False).values)
-    hits = torch.cat(found, dim=1).long()  # (B, M, k), num_points where there are no more
-    first = hits[..., :1]
-    hits = torch.where(hits < num_points, hits, first)
-    return torch.cat([hits, first.expand(-1, -1, num_samples - k)], dim=-1)
+def _neighbour_amax(values: Tensor, indices: Tensor) -> Tensor:
+    batch, num_queries, k = indices.shape
+    flat, rows = values.flatten(0, 1), _flat_rows(values, indices).flatten(0, 1)  # (B * N, C), (B * M, k)
+    out = flat.new_empty(len(rows), flat.shape[1])
+    for piece in _pieces(len(rows), k * flat.shape[1]):
+        torch.amax(flat.index_select(0, rows[piece].flatten()).view(-1, k, flat.shape[1]), 1, out=out[piece])
+    return out.view(batch, num_queries, -1)
 
 
-def _distance_blocks(query: Tensor, points: Tensor) -> Iterator[tuple[int, Tensor, Tensor]]:
-    """Runs of queries: index of the first, (B, m, D) queries, (B, m, N) squared distances to all points.
-
-    Of coordinates by exact differences; of feature vectors by a matrix product.
-    """
-    query, points = at_least_float32(query.detach()), at_least_float32(points.detach())
-    block_size = max(1, _DISTANCES_PER_BLOCK // points.shape[1])
-    distances = _coordinate_distances if points.shape[2] == 3 else _feature_distances
-    for start in range(0, query.shape[1], block_size):
-        block = query[:, start : start + block_size]
-        yield start, block, distances(block, points)
+def _linear_amax(rows: Tensor, weight: Tensor) -> Tensor:
+    out = rows.new_empty(len(rows), len(weight))
+    for piece in _pieces(len(rows), rows.shape[1] * len(weight)):
+        torch.amax(functional.linear(rows[piece], weight), 1, out=out[piece])
+    return out
 
 
-def _coordinate_distances(query: Tensor, points: Tensor) -> Tensor:
-    """(B, M, N) squared distances, exactly zero for equal points."""
-    columns = points.mT.contiguous()  # (B, 3, N)
-    squared = (query[..., :1] - columns[:, :1]).square_()
-    for axis in (1, 2):
-        difference = query[..., axis : axis + 1] - columns[:, axis : axis + 1]
-        squared.addcmul_(difference, difference)
-    return squared
+class _NeighbourMax(torch.autograd.Function):
+    @staticmethod
+    def forward(ctx: Any, values: Tensor, indices: Tensor) -> Tensor:
+        batch, num_queries, k = indices.shape
+        flat, rows = values.flatten(0, 1), _flat_rows(values, indices).flatten(0, 1)
+        channels = flat.shape[1]
+        out = flat.new_empty(len(rows), channels)
+        winners = torch.empty(len(rows), channels, dtype=torch.int64, device=values.device)
+        for piece in _pieces(len(rows), k * channels):
+            neighbours = flat.index_select(0, rows[piece].flatten()).view(-1, k, channels)
+            out[piece], slot = _first_winner(neighbours)
+            torch.gather(rows[piece], 1, slot.long(), out=winners[piece])
+        ctx.save_for_backward(winners)
+        ctx.shape = values.shape
+        return out.view(batch, num_queries, channels)
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, grad: Tensor) -> tuple[Tensor, None]:
+        (winners,) = ctx.saved_tensors
+        place = winners * grad.shape[-1] + torch.arange(grad.shape[-1], device=grad.device)
+        spread = grad.new_zeros(ctx.shape)
+        spread.view(-1).index_add_(0, place.view(-1), grad.reshape(-1))
+        return spread, None
 
 
-def _feature_distances(query: Tensor, points: Tensor) -> Tensor:
-    """(B, M, N) squared distances up to a constant per query, which leaves the order of the points."""
-    origin = points.mean(dim=1, keepdim=True)  # far from the origin, squares lose the digits that matter
-    points = points - origin
-    squared_norms = points.square().sum(-1).unsqueeze(1)  # (B, 1, N)
-    return torch.baddbmm(squared_norms, query - origin, points.mT, alpha=-2)
+class _NeighbourSum(torch.autograd.Function):
+    @staticmethod
+    def forward(ctx: Any, values: Tensor, indices: Tensor) -> Tensor:
+        bags = _flat_rows(values, indices).flatten(0, 1)  # (B * M, k)
+        ctx.save_for_backward(bags)
+        ctx.shape = values.shape
+        return functional.embedding_bag(bags, values.flatten(0, 1), mode="sum").view(*indices.shape[:2], -1)
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, grad: Tensor) -> tuple[Tensor, None]:
+        """The same sum on the reversed graph: over the queries that have a point as a neighbour."""
+        (bags,) = ctx.saved_tensors
+        num_points = ctx.shape[0] * ctx.shape[1]
+        points, edges = bags.flatten().sort()
+        first = torch.searchsorted(points, torch.arange(num_points, device=grad.device))
+        queries = edges // bags.shape[1]
+        spread = functional.embedding_bag(queries, grad.flatten(0, 1).contiguous(), first, mode="sum")
+        return spread.view(ctx.shape), None
+
+
+class _MaxOverPoints(torch.autograd.Function):
+    @staticmethod
+    def forward(ctx: Any, values: Tensor) -> Tensor:
+        groups = values.flatten(0, -3)  # (G, K, C)
+        out = groups.new_empty(len(groups), groups.shape[2])
+        winners = torch.empty(out.shape, dtype=torch.int64, device=values.device)
+        for piece in _pieces(len(groups), groups[0].numel()):
+            out[piece], winners[piece] = _first_winner(groups[piece])
+        ctx.save_for_backward(winners)
+        ctx.shape = values.shape
+        return out.view(*values.shape[:-2], -1)
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, grad: Tensor) -> Tensor:
+        (winners,) = ctx.saved_tensors
+        spread = grad.new_zeros(ctx.shape)
+        spread.flatten(0, -3).scatter_(1, winners.unsqueeze(1), grad.reshape(len(winners), 1, -1))
+        return spread
+
+
+class _LinearMax(torch.autograd.Function):
+    @staticmethod
+    def forward(ctx: Any, rows: Tensor, weight: Tensor) -> Tensor:
+        out = rows.new_empty(len(rows), len(weight))
+        winners = torch.empty(out.shape, dtype=torch.int64, device=rows.device)
+        for group, (largest, winner) in enumerate(zip(out, winners, strict=True)):
+            largest[:], winner[:] = _winner_in_groups(functional.linear(rows[group], weight))
+        ctx.save_for_backward(rows, weight, winners)
+        return out
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, grad: Tensor) -> tuple[Tensor | None, Tensor]:
+        rows, weight, winners = ctx.saved_tensors
+        flat, places = rows.flatten(0, 1), _flat_rows(rows, winners).flatten()
+        picked = flat.index_select(0, places).view(*winners.shape, -1)  # (G, C', C)
+        weight_grad = torch.einsum("gc,gcd->cd", grad, picked)
+        if not ctx.needs_input_grad[0]:
+            return None, weight_grad
+        spread = torch.zeros_like(flat)
+        spread.index_add_(0, places, (grad.unsqueeze(-1) * weight).flatten(0, 1))
+        return spread.view_as(rows), weight_grad
+
+
+def _winner_in_groups(values: Tensor) -> tuple[Tensor, Tensor]:
+    """Maximum over the (N, C) values of each channel and the first index that has it."""
+    if len(values) % _GROUP:
+        largest, winner = _first_winner(values.unsqueeze(0))
+        return largest[0], winner[0].long()
+    groups = values.view(-1, _GROUP, values.shape[1])
+    largest, group = groups.amax(1).max(0)  # (C,)
+    members = groups.gather(0, group.view(1, 1, -1).expand(1, _GROUP, -1))  # (1, 64, C)
+    return largest, group * _GROUP + _first_winner(members)[1][0]
+
+
+class _WithMoments(torch.autograd.Function):
+    @staticmethod
+    def forward(ctx: Any, rows: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        count, channels = rows.shape
+        wide = torch.promote_types(rows.dtype, torch.float32)
+        mean = rows.mean(0, dtype=wide)
+        covariance = torch.zeros(channels, channels, dtype=wide, device=rows.device)
+        for piece in _pieces(count, 2 * channels):
+            centred = rows[piece] - mean
+            covariance.addmm_(centred.T, centred, alpha=1 / count)
+        ctx.save_for_backward(rows, mean)
+        return rows.view_as(rows), mean, covariance
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, grad: Tensor, mean_grad: Tensor, covariance_grad: Tensor) -> Tensor:
+        rows, mean = ctx.saved_tensors
+        slope = (covariance_grad + covariance_grad.T) / len(rows)
+        constant = (mean_grad / len(rows) - mean @ slope).to(grad.dtype)
+        slope = slope.to(grad.dtype)
+        for piece in _pieces(len(rows), 2 * rows.shape[1]):
+            grad[piece].addmm_(rows[piece], slope).add_(constant)
+        return grad
+
+
+_sum_neighbours: Callable[[Tensor, Tensor], Tensor] = _NeighbourSum.apply
+_max_neighbours: Callable[[Tensor, Tensor], Tensor] = _NeighbourMax.apply
+_max_points: Callable[[Tensor], Tensor] = _MaxOverPoints.apply
+_max_linear: Callable[[Tensor, Tensor], Tensor] = _LinearMax.apply
+_moments: Callable[[Tensor], tuple[Tensor, Tensor, Tensor]] = _WithMoments.apply

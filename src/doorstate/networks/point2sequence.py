@@ -11,16 +11,17 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from doorstate.errors import ConfigError
-from doorstate.networks.base import PointNetwork
+from doorstate.networks.base import Neighbourhoods, PointNetwork
 from doorstate.networks.layers import (
+    Dense,
     PooledMLP,
     RowBatchNorm,
     classification_head,
-    dense,
     glorot,
     set_batchnorm,
 )
-from doorstate.networks.ops import gather_rows, knn
+from doorstate.networks.ops import gather_rows
+from doorstate.networks.search import knn
 
 NUM_CENTRES = 384
 WIDTH = 128
@@ -109,21 +110,21 @@ class Point2Sequence(PointNetwork):
         self.encoder = LSTMCell(WIDTH, WIDTH)
         self.decoder = LSTMCell(2 * WIDTH, WIDTH)  # input: [encoder state; previous attention]
         self.attention = Attention(WIDTH)
-        self.region = nn.Sequential(RowBatchNorm(WIDTH), nn.ReLU(), dense(WIDTH, WIDTH))
+        self.region = nn.Sequential(RowBatchNorm(WIDTH), nn.ReLU(), Dense(WIDTH, WIDTH))
         self.globals = PooledMLP(WIDTH, (256, 512, 1024))
         self.head = classification_head(self.feature_size, num_classes, dropout=0.6)
         set_batchnorm(self, eps=batchnorm_eps)
 
-    def neighbours(self, points: Tensor) -> Tensor:
-        """(B, M, 128) sorted neighbours of the centres; the areas are its first 16, 32, 64 and 128."""
+    def neighbourhoods(self, points: Tensor) -> Neighbourhoods:
+        """One (B, M, 128): sorted neighbours of the centres; the areas are its first 16, 32, 64 and 128."""
         largest = max(AREAS)
         # Deviation: with fewer than 128 * dilation points the dilation shrinks.
         dilation = min(self.dilation, points.shape[1] // largest)
-        return knn(points[:, :NUM_CENTRES], points, largest * dilation)[..., ::dilation]
+        return (knn(points[:, :NUM_CENTRES], points, largest * dilation)[..., ::dilation],)
 
-    def sequence(self, points: Tensor) -> Tensor:
-        """(B, M, 4, 128) features of the areas, smallest first."""
-        offsets = gather_rows(points, self.neighbours(points))  # (B, M, 128, 3)
+    def sequence(self, points: Tensor, neighbours: Tensor) -> Tensor:
+        """(B, M, 4, 128) features of the areas, smallest first; neighbours are (B, M, 128)."""
+        offsets = gather_rows(points, neighbours)  # (B, M, 128, 3)
         offsets = offsets - points[:, :NUM_CENTRES].unsqueeze(2)
         areas = [mlp(offsets[:, :, :size]) for size, mlp in zip(AREAS, self.mlps, strict=True)]
         return torch.stack(areas, dim=2)
@@ -138,9 +139,10 @@ class Point2Sequence(PointNetwork):
         hidden, _ = self.decoder(memory[-1])  # one step; the previous attention is zero
         return torch.stack(memory, dim=2), hidden
 
-    def features(self, points: Tensor) -> Tensor:
+    def features(self, points: Tensor, neighbourhoods: Neighbourhoods | None = None) -> Tensor:
         """(B, 1024) maximum over the centres, whose coordinates enter absolutely."""
-        region, query = self.encode(self.sequence(points))
+        (neighbours,) = neighbourhoods or self.neighbourhoods(points)
+        region, query = self.encode(self.sequence(points, neighbours))
         region = self.attention(region, query) if self.region_feature == "attention" else query
         pooled: Tensor = self.globals(points[:, :NUM_CENTRES], self.region(region))
         return pooled

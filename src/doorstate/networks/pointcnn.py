@@ -13,9 +13,10 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from doorstate.networks.base import PointNetwork
+from doorstate.networks.base import Neighbourhoods, PointNetwork
 from doorstate.networks.layers import PointLinear, RowBatchNorm, set_batchnorm
-from doorstate.networks.ops import at_least_float32, full_precision, gather_rows, knn
+from doorstate.networks.ops import at_least_float32, full_precision, gather_rows
+from doorstate.networks.search import knn
 
 
 class Level(NamedTuple):
@@ -100,11 +101,16 @@ class XConv(nn.Module):
         representatives = points[:, : self.num_representatives]
         return knn(representatives, points, self.k * dilation)[..., ::dilation]
 
-    def forward(self, points: Tensor, features: Tensor | None) -> tuple[Tensor, Tensor]:
-        """Representatives (B, P, 3) and their features (B, P, out_channels), of (B, N, 3) and (B, N, F)."""
+    def forward(self, points: Tensor, features: Tensor | None, indices: Tensor) -> tuple[Tensor, Tensor]:
+        """Representatives (B, P, 3) and their features (B, P, out_channels).
+
+        Args:
+            points: (B, N, 3).
+            features: (B, N, F), None in the first level.
+            indices: (B, P, K) as `neighbours` returns them.
+        """
         # Deviation: the first points in farthest-point order, not the first of a random permutation.
         representatives = points[:, : self.num_representatives]
-        indices = self.neighbours(points)
         offsets = gather_rows(points, indices) - representatives.unsqueeze(2)  # (B, P, K, 3)
         rows = self.lift(offsets)  # (B, P, K, C_lift)
         if features is not None:
@@ -157,28 +163,42 @@ class PointCNN(PointNetwork):
         nn.init.zeros_(self.head.bias)
         set_batchnorm(self, eps=batchnorm_eps)
 
-    def point_features(self, points: Tensor) -> Tensor:
+    def neighbourhoods(self, points: Tensor) -> Neighbourhoods:
+        """(B, P, K) neighbours of the representative points of each level."""
+        found = []
+        for level in self.levels:
+            assert isinstance(level, XConv)
+            found.append(level.neighbours(points))
+            points = points[:, : level.num_representatives]
+        return tuple(found)
+
+    def point_features(self, points: Tensor, neighbourhoods: Neighbourhoods | None = None) -> Tensor:
         """(B, P, 192) features of the representative points of the last level."""
         self.check(points)
         features = None
-        for level in self.levels:
-            points, features = level(points, features)
+        known = neighbourhoods or self.neighbourhoods(points)
+        for level, indices in zip(self.levels, known, strict=True):
+            points, features = level(points, features, indices)
         rows: Tensor = self.dense(features)
         return rows
 
-    def features(self, points: Tensor) -> Tensor:
+    def features(self, points: Tensor, neighbourhoods: Neighbourhoods | None = None) -> Tensor:
         """(B, 192) mean of `point_features`."""
-        return at_least_float32(self.point_features(points)).mean(dim=1)
+        return at_least_float32(self.point_features(points, neighbourhoods)).mean(dim=1)
 
-    def point_logits(self, points: Tensor) -> Tensor:
+    def point_logits(self, points: Tensor, neighbourhoods: Neighbourhoods | None = None) -> Tensor:
         """(B, P, num_classes) logits of the representative points of the last level."""
-        return at_least_float32(self.head(self.point_features(points)))
+        return at_least_float32(self.head(self.point_features(points, neighbourhoods)))
 
     def training_loss(
-        self, points: Tensor, labels: Tensor, label_smoothing: float = 0.0
+        self,
+        points: Tensor,
+        labels: Tensor,
+        label_smoothing: float = 0.0,
+        neighbourhoods: Neighbourhoods | None = None,
     ) -> tuple[Tensor, Tensor]:
         """Mean cross entropy of all representative points; the logits returned are their mean."""
-        logits = self.point_logits(points)  # (B, P, C)
+        logits = self.point_logits(points, neighbourhoods)  # (B, P, C)
         tiled = labels.unsqueeze(1).expand(logits.shape[:2])  # (B, P)
         loss = functional.cross_entropy(
             logits.flatten(0, 1), tiled.flatten(), label_smoothing=label_smoothing

@@ -7,8 +7,8 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from doorstate.networks.base import PointNetwork
-from doorstate.networks.layers import DenseMax, PointMLP, classification_head, dense, set_batchnorm
+from doorstate.networks.base import Neighbourhoods, PointNetwork
+from doorstate.networks.layers import Dense, DenseMax, PointMLP, classification_head, set_batchnorm
 from doorstate.networks.ops import at_least_float32, full_precision
 
 
@@ -18,9 +18,9 @@ class TransformNet(nn.Module):
     def __init__(self, size: int) -> None:
         super().__init__()
         self.size = size
-        self.trunk = PointMLP(0, (64, 128)) if size == 3 else nn.Sequential(dense(size, 64), dense(64, 128))
+        self.trunk = PointMLP(0, (64, 128)) if size == 3 else nn.Sequential(Dense(size, 64), Dense(64, 128))
         self.pool = DenseMax(128, 1024)
-        self.dense = nn.Sequential(dense(1024, 512), dense(512, 256))
+        self.dense = nn.Sequential(Dense(1024, 512), Dense(512, 256))
         self.output = nn.Linear(256, size * size)
         nn.init.zeros_(self.output.weight)
         nn.init.zeros_(self.output.bias)
@@ -53,16 +53,20 @@ class PointNet(PointNetwork):
         self.input_transform = TransformNet(3)
         self.local = PointMLP(0, (64, 64))
         self.feature_transform = TransformNet(64)
-        self.encoder = nn.Sequential(dense(64, 64), dense(64, 128), DenseMax(128, 1024))
+        self.encoder = nn.Sequential(Dense(64, 64), Dense(64, 128), DenseMax(128, 1024))
         self.head = classification_head(self.feature_size, num_classes, dropout=0.3)
         set_batchnorm(self, eps=batchnorm_eps)
 
-    def features(self, points: Tensor) -> Tensor:
+    def features(self, points: Tensor, neighbourhoods: Neighbourhoods | None = None) -> Tensor:
         """(B, 1024) maximum over the points."""
         return self._encode(points)[0]
 
     def training_loss(
-        self, points: Tensor, labels: Tensor, label_smoothing: float = 0.0
+        self,
+        points: Tensor,
+        labels: Tensor,
+        label_smoothing: float = 0.0,
+        neighbourhoods: Neighbourhoods | None = None,
     ) -> tuple[Tensor, Tensor]:
         """Cross entropy + weight/2 * sum over the batch of |A A^T - I|_F^2, A the feature transform.
 

@@ -10,9 +10,10 @@ import torch
 from torch import Tensor, nn
 
 from doorstate.errors import ConfigError
-from doorstate.networks.base import PointNetwork
+from doorstate.networks.base import Neighbourhoods, PointNetwork
 from doorstate.networks.layers import PooledMLP, classification_head, set_batchnorm
-from doorstate.networks.ops import ball_query, gather_rows
+from doorstate.networks.ops import gather_rows
+from doorstate.networks.search import ball_query
 
 
 class Scale(NamedTuple):
@@ -59,12 +60,17 @@ class SetAbstraction(nn.Module):
         self.mlps = nn.ModuleList([PooledMLP(num_features, scale.channels) for scale in scales])
         self.out_channels = sum(scale.channels[-1] for scale in scales)
 
-    def forward(self, points: Tensor, features: Tensor | None) -> tuple[Tensor, Tensor]:
+    def neighbourhoods(self, points: Tensor) -> tuple[Tensor, ...]:
+        """(B, M, K) points in the balls around the centres, one per scale."""
+        return tuple(ball_query(points[:, : self.num_centres], points, *ball) for ball in self.balls)
+
+    def forward(
+        self, points: Tensor, features: Tensor | None, neighbourhoods: Neighbourhoods
+    ) -> tuple[Tensor, Tensor]:
         """(B, M, 3) centres and (B, M, out_channels) features of (B, N, 3) points and (B, N, F) features."""
         centres = points[:, : self.num_centres]
         pooled = []
-        for (radius, num_samples), mlp in zip(self.balls, self.mlps, strict=True):
-            indices = ball_query(centres, points, radius, num_samples)  # (B, M, K)
+        for indices, mlp in zip(neighbourhoods, self.mlps, strict=True):
             offsets = gather_rows(points, indices) - centres.unsqueeze(2)  # (B, M, K, 3)
             pooled.append(mlp(offsets, features, indices))
         return centres, torch.cat(pooled, dim=-1)
@@ -85,6 +91,7 @@ class PointNet2(PointNetwork):
     """
 
     feature_size = 1024
+    neighbours_keep_under_scale = False  # a ball keeps its radius
 
     def __init__(
         self,
@@ -109,9 +116,17 @@ class PointNet2(PointNetwork):
         self.head = classification_head(self.feature_size, num_classes, dropout)
         set_batchnorm(self, eps=batchnorm_eps)
 
-    def features(self, points: Tensor) -> Tensor:
+    def neighbourhoods(self, points: Tensor) -> Neighbourhoods:
+        """Balls of the first level's scales, then of the second's."""
+        return self.level1.neighbourhoods(points) + self.level2.neighbourhoods(
+            points[:, : self.level1.num_centres]
+        )
+
+    def features(self, points: Tensor, neighbourhoods: Neighbourhoods | None = None) -> Tensor:
         """(B, 1024) maximum over the centres of the second level, whose coordinates enter absolutely."""
-        centres, features = self.level1(points, None)
-        centres, features = self.level2(centres, features)
+        balls = neighbourhoods or self.neighbourhoods(points)
+        scales = len(self.level1.balls)
+        centres, features = self.level1(points, None, balls[:scales])
+        centres, features = self.level2(centres, features, balls[scales:])
         pooled: Tensor = self.level3(centres, features)
         return pooled

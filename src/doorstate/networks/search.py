@@ -1,0 +1,244 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which points are neighbours: the k nearest of each query, and balls around centres.
+
+Both are exact. Coordinates stay in full precision even under autocast; no gradient flows through a choice.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import ceil
+
+import torch
+from torch import Tensor
+
+from doorstate.networks.ops import at_least_float32, full_precision, gather_rows
+
+_DISTANCES_PER_BLOCK = 2**19  # 2 MiB of float32 stay in a core's cache
+_BLOCK_SIZES = range(16, 33)
+_FEWEST_POINTS = 1024  # below, all distances are cheaper than choosing which to compute
+_ROUNDING = 1e-5  # of squared float32 distances, relative to the largest squared norm; ten times what is seen
+_FAR, _NOBODY = 1e30, 2**31 - 1
+
+
+def spatial_order(points: Tensor) -> Tensor:
+    """Order in which every run of points lies together: the leaves of a k-d tree with equal halves, in turn.
+
+    Only time depends on it. An exported graph has the order as it is, since there all distances are taken.
+
+    Args:
+        points: (B, N, D).
+
+    Returns:
+        (B, N) int64 permutation of each cloud.
+    """
+    batch, num_points, dimensions = points.shape
+    order = torch.arange(num_points, device=points.device).expand(batch, -1)
+    size = 0 if torch.compiler.is_exporting() else num_points
+    while size and size % 2 == 0 and size not in _BLOCK_SIZES:
+        cells = points.reshape(-1, size, dimensions)
+        widest = (cells.amax(1) - cells.amin(1)).argmax(-1).view(-1, 1, 1)
+        along = cells.gather(2, widest.expand(-1, size, 1)).squeeze(2).argsort(dim=1)  # (cells, size)
+        order = order.reshape(-1, size).gather(1, along).view(batch, -1)
+        points = gather_rows(cells, along)
+        size //= 2
+    return order
+
+
+def knn(query: Tensor, points: Tensor, k: int, *, in_order: bool = False) -> Tensor:
+    """Nearest neighbours, nearest first.
+
+    A query equal to the point of the same index is that point: it comes first, whatever duplicates it has
+    (all networks query a prefix of the points).
+
+    Args:
+        query: (B, M, D), M <= N.
+        points: (B, N, D).
+        k: number of neighbours; at most N are returned.
+        in_order: points come in `spatial_order` already, of themselves or of what they were computed from.
+            Only the time depends on it.
+
+    Returns:
+        (B, M, min(k, N)) int64 indices into points.
+    """
+    k = min(k, points.shape[1])
+    with full_precision(points):
+        query, points = query.detach(), points.detach()
+        if not _blocks_pay(query, points, k):
+            return _nearest_of_all(at_least_float32(query), at_least_float32(points), k)
+        names = torch.arange(points.shape[1], device=points.device).expand(len(points), -1)
+        own = torch.where((query == points).all(-1), names, -1)
+        if in_order:
+            return _nearest_in_blocks(query, points, own, names, k)
+        order = spatial_order(points)
+        found = _nearest_in_blocks(
+            gather_rows(query, order), gather_rows(points, order), own.gather(1, order), order, k
+        )
+        return torch.empty_like(found).scatter_(1, order.unsqueeze(-1).expand_as(found), found)
+
+
+def ball_query(centres: Tensor, points: Tensor, radius: float, num_samples: int) -> Tensor:
+    """First points, in index order, strictly closer than a radius (PointNet++ grouping).
+
+    Args:
+        centres: (B, M, 3), each also one of the points, so that no ball is empty.
+        points: (B, N, 3).
+        radius: in the unit of the points.
+        num_samples: slots per centre; slots left over repeat the first hit.
+
+    Returns:
+        (B, M, num_samples) int64 indices into points.
+    """
+    num_points = points.shape[1]
+    # Indices as float32 (exact up to 2^24): topk on floats is twice as fast as on integers.
+    index = torch.arange(num_points, device=points.device, dtype=torch.float32)
+    k = min(num_samples, num_points)
+    found = []
+    for _, _, squared in _distance_blocks(centres, points):
+        hits = torch.where(squared < radius**2, index, float(num_points))
+        found.append(hits.topk(k, largest=False).values)
+    hits = torch.cat(found, dim=1).long()  # (B, M, k), num_points where there are no more
+    first = hits[..., :1]
+    hits = torch.where(hits < num_points, hits, first)
+    return torch.cat([hits, first.expand(-1, -1, num_samples - k)], dim=-1)
+
+
+def _nearest_of_all(query: Tensor, points: Tensor, k: int) -> Tensor:
+    found = []
+    for start, block, distances in _distance_blocks(query, points):
+        same_index = torch.arange(start, start + block.shape[1], device=points.device)  # (m,)
+        same = (block == points[:, start : start + block.shape[1]]).all(-1, keepdim=True)  # (B, m, 1)
+        column = same_index.view(1, -1, 1).expand_as(same)
+        own = torch.where(same, -torch.inf, distances.gather(2, column))
+        found.append(distances.scatter_(2, column, own).topk(k, largest=False).indices)
+    return torch.cat(found, dim=1)
+
+
+def _block_size(count: int) -> int:
+    while count % 2 == 0 and count not in _BLOCK_SIZES:
+        count //= 2
+    return count
+
+
+def _blocks_pay(query: Tensor, points: Tensor, k: int) -> bool:
+    return (
+        points.dtype == torch.float32
+        and points.shape[1] >= max(_FEWEST_POINTS, 8 * k)
+        and query.shape == points.shape
+        and _block_size(points.shape[1]) in _BLOCK_SIZES
+        and not torch.compiler.is_exporting()  # how many distances are needed depends on the points
+    )
+
+
+def _nearest_in_blocks(query: Tensor, points: Tensor, own: Tensor, names: Tensor, k: int) -> Tensor:
+    """Nearest neighbours of runs of queries in those runs of points that can hold any.
+
+    A run of points has a centre and a radius. By the triangle inequality it can be left out for a query whose
+    distance to the centre, less the radius, exceeds what k points closer by are known to be within.
+
+    Args:
+        query: (B, M, D).
+        points: (B, N, D).
+        own: (B, M) name of the point a query is, or -1.
+        names: (B, N) what each point is called in the result.
+        k: number of neighbours.
+
+    Returns:
+        (B, M, k) names, by distance and then by name.
+    """
+    batch, _, dimensions = query.shape
+    origin = points.mean(dim=1, keepdim=True)  # far from the origin, squares lose the digits that matter
+    query, points = query - origin, points - origin
+    blocks = points.view(batch, -1, _block_size(points.shape[1]), dimensions)  # (B, P, p, D)
+    runs = query.view(batch, -1, _block_size(query.shape[1]), dimensions)  # (B, Q, q, D)
+    (num_blocks, block_size), (num_runs, run_size) = blocks.shape[1:3], runs.shape[1:3]
+    centres = blocks.mean(2)  # (B, P, D)
+    radii = (blocks - centres.unsqueeze(2)).square().sum(-1).amax(2).sqrt()  # (B, P)
+    slack = _ROUNDING * points.square().sum(-1).amax(1).view(batch, 1, 1)  # (B, 1, 1)
+
+    left, right = _factors(runs, blocks)
+    right, labels = right.flatten(0, 1), names.reshape(-1, block_size)  # of B * P blocks
+    # One more block, far away, fills lists of blocks that are shorter than others.
+    far = right.new_zeros(1, block_size, dimensions + 2)
+    far[..., -1] = _FAR
+    right = torch.cat([right, far])
+    labels = torch.cat([labels, labels.new_full((1, block_size), _NOBODY)])
+    first_block = num_blocks * torch.arange(batch, device=points.device).view(-1, 1, 1)
+
+    def distances(chosen: Tensor, lists: Tensor) -> Tensor:
+        """(g, q, n * p) squared distances of chosen runs to the blocks in their lists (g, n)."""
+        candidates = right.index_select(0, lists.flatten()).view(len(lists), -1, dimensions + 2)
+        return torch.bmm(left.index_select(0, chosen), candidates.mT).clamp_min_(torch.finfo(left.dtype).tiny)
+
+    left = left.flatten(0, 1)  # (B * Q, q, D + 2)
+    every = torch.arange(len(left), device=points.device)
+    near = torch.cdist(runs.mean(2), centres).topk(ceil(1.5 * k / block_size), largest=False).indices
+    bound = distances(every, (near + first_block).flatten(0, 1)).kthvalue(k).values.view(batch, -1, 1)
+    reach = (bound + slack).sqrt() + radii.unsqueeze(1)  # (B, M, P)
+    to_centre = torch.bmm(*_factors(query, centres, transpose=True)) - slack
+    needed = (to_centre <= reach.square_()).view(batch, num_runs, run_size, num_blocks).any(2)  # (B, Q, P)
+
+    count, order = needed.sum(2).flatten().sort()
+    lists = needed.byte().argsort(dim=2, descending=True, stable=True)
+    lists = torch.where(needed.gather(2, lists), lists + first_block, len(right) - 1).flatten(0, 1)
+    found = names.new_empty(batch * num_runs, run_size, k)
+    own = own.view(-1, run_size, 1)
+    for chosen, width in _chunks(order, count, run_size * block_size):
+        shortened = lists.index_select(0, chosen)[:, :width]
+        squared = distances(chosen, shortened)
+        name = labels.index_select(0, shortened.flatten()).view(len(chosen), 1, -1)  # (g, 1, n * p)
+        squared.masked_fill_(own.index_select(0, chosen) == name, 0)
+        # Bits of positive floats sort as the floats do; the name below them settles ties.
+        keys = squared.view(torch.int32).long().bitwise_left_shift_(32).bitwise_or_(name)
+        found[chosen] = keys.topk(k, largest=False).values.bitwise_and_(2**32 - 1)
+    return found.view(batch, -1, k)
+
+
+def _factors(query: Tensor, points: Tensor, transpose: bool = False) -> tuple[Tensor, Tensor]:
+    """Factors (..., D + 2) whose rows' inner products are squared distances."""
+    one, square = query.new_ones(1), points.square().sum(-1, keepdim=True)
+    left = torch.cat([-2 * query, query.square().sum(-1, keepdim=True), one.expand_as(query[..., :1])], -1)
+    right = torch.cat([points, one.expand_as(square), square], -1)
+    return left, right.mT if transpose else right
+
+
+def _chunks(order: Tensor, count: Tensor, pairs: int) -> Iterator[tuple[Tensor, int]]:
+    """Runs whose lists are alike in length, as many as fit the cache, with the longest list's length."""
+    counts = count.tolist()
+    stop = len(counts)
+    while stop > 0:
+        width = counts[stop - 1]
+        start = max(0, stop - max(1, _DISTANCES_PER_BLOCK // (width * pairs)))
+        yield order[start:stop], width
+        stop = start
+
+
+def _distance_blocks(query: Tensor, points: Tensor) -> Iterator[tuple[int, Tensor, Tensor]]:
+    """Runs of queries: index of the first, (B, m, D) queries, (B, m, N) squared distances to all points.
+
+    Of coordinates by exact differences; of feature vectors by a matrix product.
+    """
+    query, points = at_least_float32(query.detach()), at_least_float32(points.detach())
+    block_size = max(1, _DISTANCES_PER_BLOCK // points.shape[1])
+    distances = _coordinate_distances if points.shape[2] == 3 else _feature_distances
+    for start in range(0, query.shape[1], block_size):
+        block = query[:, start : start + block_size]
+        yield start, block, distances(block, points)
+
+
+def _coordinate_distances(query: Tensor, points: Tensor) -> Tensor:
+    """(B, M, N) squared distances, exactly zero for equal points."""
+    columns = points.mT.contiguous()  # (B, 3, N)
+    squared = (query[..., :1] - columns[:, :1]).square_()
+    for axis in (1, 2):
+        difference = query[..., axis : axis + 1] - columns[:, axis : axis + 1]
+        squared.addcmul_(difference, difference)
+    return squared
+
+
+def _feature_distances(query: Tensor, points: Tensor) -> Tensor:
+    """(B, M, N) squared distances up to a constant per query, which leaves the order of the points."""
+    origin = points.mean(dim=1, keepdim=True)  # far from the origin, squares lose the digits that matter
+    points = points - origin
+    squared_norms = points.square().sum(-1).unsqueeze(1)  # (B, 1, N)
+    return torch.baddbmm(squared_norms, query - origin, points.mT, alpha=-2)
