@@ -60,7 +60,15 @@ def networks(
         bool, typer.Option("--fresh", help="Measure again what is stored in the folder.")
     ] = False,
 ) -> None:
-    """Training and inference of the five networks against their plain forms and public ports."""
+    """Training and inference of the five networks against their plain forms and public ports.
+
+    Networks and numbers of points that the folder holds already are kept.
+
+    \b
+    Examples:
+      python -m benchmarks networks --out reports/speed
+      python -m benchmarks networks --networks dgcnn --points 1024 --port-dgcnn ../dgcnn.pytorch --out reports/dgcnn
+    """
     from benchmarks.clouds import dataset_clouds, simulated_clouds
     from benchmarks.networks import INFERENCE_BATCHES, Plan, run, table_of
     from benchmarks.store import Store
