@@ -130,3 +130,19 @@ def test_a_seed_draws_the_same_again(seed: int) -> None:
 def test_impossible_settings_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(ValidationError):
         Augmentation.model_validate(wrong)
+
+
+@pytest.mark.parametrize(
+    ("augmentation", "similar", "rigid"),
+    [
+        (Augmentation(), True, True),
+        (Augmentation(yaw_deg=90, mirror=0.5, shift=1, tilt_deg=5), True, True),
+        (Augmentation(scale=(0.9, 1.1)), True, False),
+        (Augmentation(scale_z=(1.0, 1.0)), False, False),
+        (Augmentation(jitter=0.001), False, False),
+    ],
+)
+def test_which_augmentations_keep_distances_and_which_their_order(
+    augmentation: Augmentation, similar: bool, rigid: bool
+) -> None:
+    assert (augmentation.is_similarity, augmentation.is_rigid) == (similar, rigid)

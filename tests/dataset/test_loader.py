@@ -104,3 +104,29 @@ def test_more_points_than_there_are_or_unknown_samples_are_refused(dataset: Prep
         CloudLoader(dataset, ["s0"], 41)
     with pytest.raises(DatasetError, match="holds no sample 's99'"):
         CloudLoader(dataset, ["s0", "s99"], 40)
+
+
+def test_neighbours_are_searched_once_per_cloud_and_belong_to_it(dataset: PreparedDataset) -> None:
+    searched: list[int] = []
+
+    def nearest(points: torch.Tensor) -> tuple[torch.Tensor, ...]:
+        searched.append(len(points))
+        return (torch.cdist(points, points).argsort(dim=2, stable=True)[:, :, :4],)
+
+    samples = [row["sample_id"] for row in dataset.rows]
+    loader = CloudLoader(dataset, samples, 40, nearest)
+    turned = Augmentation(yaw_deg=30, mirror=0.5, scale=(0.8, 1.2), shift=0.1)
+    for epoch in range(3):
+        for batch in loader.shuffled(4, turned, (0, 0, epoch)):
+            assert batch.neighbourhoods is not None
+            (kept,) = batch.neighbourhoods
+            assert (kept.dtype, kept.shape) == (torch.int64, (4, 40, 4))
+            distances = torch.cdist(batch.points.double(), batch.points.double())
+            expected = distances.sort(dim=2).values[:, :, :4]
+            torch.testing.assert_close(distances.gather(2, kept), expected, rtol=0, atol=1e-5)
+    list(loader.in_order(5))
+    assert sum(searched) == len(samples)
+
+
+def test_without_a_search_there_are_no_neighbours(loader: CloudLoader) -> None:
+    assert {batch.neighbourhoods for batch in loader.in_order(5)} == {None}

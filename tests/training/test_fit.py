@@ -16,6 +16,7 @@ from doorstate.clouds.augment import Augmentation
 from doorstate.dataset.splits import Role, draw_splits
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import DatasetError, RunError
+from doorstate.networks.pointnet2 import PointNet2
 from doorstate.simulation.manifest import read_csv
 from doorstate.training import fit as fit_module
 from doorstate.training.fit import RunConfig, fit
@@ -205,3 +206,38 @@ def test_every_network_trains_with_its_authors_recipe(
     recipe = AUTHORS[name].model_copy(update={"epochs": 1, "batch_size": 8})
     metrics = fit(config(network=name, recipe=recipe), small_dataset, roles, tmp_path / "run")
     assert 0 <= metrics["test_macro_f1"] <= 1
+
+
+@pytest.mark.parametrize(("scale", "kept"), [((1.0, 1.0), True), ((0.9, 1.1), False)])
+def test_kept_neighbours_train_the_same_network(
+    small_dataset: PreparedDataset,
+    roles: dict[str, Role],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    scale: tuple[float, float],
+    kept: bool,
+) -> None:
+    searched: list[int] = []
+    search = PointNet2.neighbourhoods
+
+    def counted(self: PointNet2, points: torch.Tensor) -> tuple[torch.Tensor, ...]:
+        searched.append(len(points))
+        return search(self, points)
+
+    monkeypatch.setattr(PointNet2, "neighbourhoods", counted)
+    recipe = RECIPE.model_copy(update={"augmentation": Augmentation(yaw_deg=10, mirror=0.5, scale=scale)})
+    first = fit(config(recipe=recipe), small_dataset, roles, tmp_path / "kept")
+    clouds = {role: list(roles.values()).count(role) for role in ("train", "val", "test")}
+    per_epoch = clouds["train"] // RECIPE.batch_size * RECIPE.batch_size
+    expected = sum(clouds.values()) if kept else clouds["val"] + clouds["test"] + RECIPE.epochs * per_epoch
+    assert abs(sum(searched) - expected) < RECIPE.batch_size  # a cloud may be left out of every epoch
+    monkeypatch.setattr(fit_module._Trainer, "_neighbours_keep", lambda self: False)
+    second = fit(config(recipe=recipe), small_dataset, roles, tmp_path / "searched")
+    assert {k: v for k, v in first.items() if k != "seconds"} == {
+        k: v for k, v in second.items() if k != "seconds"
+    }
+    weights = [
+        load_weights(tmp_path / run / "weights.safetensors")[0].state_dict() for run in ("kept", "searched")
+    ]
+    for name, value in weights[0].items():
+        assert torch.equal(value, weights[1][name]), name

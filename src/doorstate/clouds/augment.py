@@ -31,6 +31,16 @@ class Augmentation(BaseModel):
     jitter: float = Field(default=0.0, ge=0)  # per coordinate N(0, jitter)
     jitter_clip: float = Field(default=0.05, ge=0)
 
+    @property
+    def is_similarity(self) -> bool:
+        """Whether all distances of a cloud stay in proportion, so that nearest neighbours stay nearest."""
+        return self.jitter == 0 and self.scale_z is None
+
+    @property
+    def is_rigid(self) -> bool:
+        """Whether all distances of a cloud stay the same."""
+        return self.is_similarity and self.scale == (1.0, 1.0)
+
 
 class AugmentationDraw(NamedTuple):
     """What was drawn for a batch of B clouds of N points."""

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -15,19 +15,36 @@ from doorstate.clouds.preparation import normalize
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import ConfigError
 
+FindNeighbours = Callable[[Tensor], tuple[Tensor, ...]]
+"""From (B, n, 3) points to (B, ...) int64 indices into them."""
+
 
 class Batch(NamedTuple):
-    """(B, n, 3) float32 normalised points and (B,) int64 labels."""
+    """(B, n, 3) float32 normalised points, (B,) int64 labels, and what the loader's search found, if it has one."""
 
     points: Tensor
     labels: Tensor
+    neighbourhoods: tuple[Tensor, ...] | None = None
 
 
 class CloudLoader:
     """The first `num_points` of chosen samples, normalised once and kept in memory."""
 
-    def __init__(self, dataset: PreparedDataset, sample_ids: Sequence[str], num_points: int) -> None:
+    def __init__(
+        self,
+        dataset: PreparedDataset,
+        sample_ids: Sequence[str],
+        num_points: int,
+        find_neighbours: FindNeighbours | None = None,
+    ) -> None:
         """Load clouds.
+
+        Args:
+            dataset: clouds.
+            sample_ids: which, in order.
+            num_points: of each cloud.
+            find_neighbours: done once per cloud, when it is first needed, before any augmentation: give it only with
+                augmentations that leave its result as it is.
 
         Raises:
             ConfigError: more points are asked for than the data set holds.
@@ -41,6 +58,9 @@ class CloudLoader:
         # A prefix of a farthest-point order is the farthest-point sample of that size.
         self._points = normalize(dataset.clouds[indices, :num_points])
         self._labels = dataset.labels[indices]
+        self._neighbours = (
+            None if find_neighbours is None else _KnownNeighbours(find_neighbours, self._points)
+        )
 
     def __len__(self) -> int:
         return len(self._labels)
@@ -64,4 +84,32 @@ class CloudLoader:
         points = self._points[chosen]
         if augmentation is not None and rng is not None:
             points = apply_augmentation(points, draw_augmentation(augmentation, rng, *points.shape[:2]))
-        return Batch(torch.from_numpy(points), torch.from_numpy(self._labels[chosen]))
+        known = None if self._neighbours is None else self._neighbours(chosen)
+        return Batch(torch.from_numpy(points), torch.from_numpy(self._labels[chosen]), known)
+
+
+class _KnownNeighbours:
+    """Neighbours of clouds by their numbers, searched at the first request."""
+
+    def __init__(self, find: FindNeighbours, points: np.ndarray) -> None:
+        self._find, self._points = find, points
+        self._searched = torch.zeros(len(points), dtype=torch.bool)
+        self._kept: tuple[Tensor, ...] = ()
+
+    def __call__(self, chosen: np.ndarray) -> tuple[Tensor, ...]:
+        clouds = torch.from_numpy(chosen)
+        new = clouds[~self._searched[clouds]]
+        if len(new):
+            self._search(new)
+        return tuple(kept[clouds].long() for kept in self._kept)
+
+    @torch.no_grad()
+    def _search(self, new: Tensor) -> None:
+        found = self._find(torch.from_numpy(self._points[new.numpy()]))
+        if not self._kept:
+            count, num_points, _ = self._points.shape
+            smallest = torch.int16 if num_points <= 2**15 else torch.int32  # a million indices a cloud add up
+            self._kept = tuple(torch.empty(count, *each.shape[1:], dtype=smallest) for each in found)
+        for kept, each in zip(self._kept, found, strict=True):
+            kept[new] = each.to(kept.dtype)
+        self._searched[new] = True

@@ -139,7 +139,7 @@ def _first_winner(values: Tensor) -> tuple[Tensor, Tensor]:
     kind = torch.int8 if num_points < 2**7 else torch.int16 if num_points < 2**15 else torch.int32
     from_end = torch.arange(num_points, 0, -1, dtype=kind, device=values.device).view(1, -1, 1)
     has_it = (values.view(whole) == largest.view(whole)).view(torch.int8)
-    return largest.squeeze(1), num_points - (has_it * from_end).amax(1)
+    return largest.squeeze(1), num_points - (has_it * from_end).amax(1).clamp_min_(1)  # NaN may equal none
 
 
 def _neighbour_amax(values: Tensor, indices: Tensor) -> Tensor:

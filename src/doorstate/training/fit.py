@@ -20,10 +20,9 @@ import numpy as np
 import torch
 from pydantic import BaseModel, ConfigDict
 from sklearn.metrics import accuracy_score, f1_score
-from torch import Tensor
 from torch.nn import functional
 
-from doorstate.dataset.loader import CloudLoader
+from doorstate.dataset.loader import Batch, CloudLoader
 from doorstate.dataset.splits import Role
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import DatasetError, RunError
@@ -122,8 +121,9 @@ def evaluate(network: PointNetwork, loader: CloudLoader, fabric: lightning_fabri
     network.eval()
     logits, labels = [], []
     for batch in loader.in_order(_EVALUATION_BATCH):
+        on_device = fabric.to_device(batch)
         with fabric.autocast():
-            logits.append(network(fabric.to_device(batch.points)).float().cpu())
+            logits.append(network(on_device.points, on_device.neighbourhoods).float().cpu())
         labels.append(batch.labels)
     all_logits, all_labels = torch.cat(logits), torch.cat(labels)
     loss = functional.cross_entropy(all_logits, all_labels).item()
@@ -157,8 +157,10 @@ class _Trainer:
             wanted = points_of_epoch(recipe, epoch, self.config.num_points)
             if loader is None or validation is None or wanted != points:
                 points = wanted
-                loader = CloudLoader(self.dataset, self.samples["train"], points)
-                validation = CloudLoader(self.dataset, self.samples["val"], points)
+                search = self.network.neighbourhoods
+                kept = search if self._neighbours_keep() else None
+                loader = CloudLoader(self.dataset, self.samples["train"], points, kept)
+                validation = CloudLoader(self.dataset, self.samples["val"], points, search)
             rate, loss = self._epoch(epoch, loader)
             found = evaluate(self.network, validation, self.fabric)
             # The final resolution is what counts: an epoch on coarser clouds is never the best of a run.
@@ -217,18 +219,23 @@ class _Trainer:
             if time.perf_counter() - told > _TELL_EVERY_S:
                 told = time.perf_counter()
                 self.run.write_position(iteration / per_epoch)
-            losses.append(
-                self._step(self.fabric.to_device(batch.points), self.fabric.to_device(batch.labels))
-            )
+            losses.append(self._step(self.fabric.to_device(batch)))
         mean = float(np.mean(losses))
         if not math.isfinite(mean):
             raise RunError(f"{self.run.path}: the loss is {mean} in epoch {epoch}; try a lower learning rate")
         return rate, mean
 
-    def _step(self, points: Tensor, labels: Tensor) -> float:
+    def _neighbours_keep(self) -> bool:
+        augmentation = self.config.recipe.augmentation
+        if self.network.neighbours_keep_under_scale:
+            return augmentation.is_similarity
+        return augmentation.is_rigid
+
+    def _step(self, batch: Batch) -> float:
         self.optimizer.zero_grad(set_to_none=True)
+        smoothing = self.config.recipe.label_smoothing
         with self.fabric.autocast():
-            loss, _ = self.network.training_loss(points, labels, self.config.recipe.label_smoothing)
+            loss, _ = self.network.training_loss(batch.points, batch.labels, smoothing, batch.neighbourhoods)
         loss.backward()  # type: ignore[no-untyped-call]
         if self.config.recipe.gradient_clip is not None:
             torch.nn.utils.clip_grad_norm_(self.network.parameters(), self.config.recipe.gradient_clip)
