@@ -12,8 +12,8 @@ $(VENV)/.complete: tools/setup.sh requirements.lock pyproject.toml
 	touch $@
 
 check: setup
-	$(BIN)/ruff check src tests tools
-	$(BIN)/ruff format --check src tests tools
+	$(BIN)/ruff check src tests tools benchmarks
+	$(BIN)/ruff format --check src tests tools benchmarks
 	$(BIN)/mypy
 	$(BIN)/python tools/check_imports.py
 

@@ -20,6 +20,7 @@ from doorstate.deployment import predictor
 from doorstate.evaluation.table import Table
 from doorstate.jobs import Progress
 from doorstate.networks import create_network
+from doorstate.training.environment import keep_freed_memory
 from doorstate.training.fit import threads as use_threads
 from doorstate.training.weights import WeightsCard
 from doorstate.types import Points
@@ -39,7 +40,8 @@ def measure(
     repeats: int,
     progress: Progress,
 ) -> list[Group]:
-    """Times of every stage in every repeat; networks take turns."""
+    """Times of every stage in every repeat, one network after the other, as a robot runs one."""
+    keep_freed_memory()  # as `doorstate predict` does
     raw, rows = raw_cloud(), []
     settings = [(count, points) for count in threads for points in numbers_of_points]
     for done, (count, points) in enumerate(settings):
@@ -51,13 +53,12 @@ def measure(
             for name in networks
         }
         with use_threads(count):
-            for predict in predictors.values():
+            runs = {}
+            for name, predict in predictors.items():
                 predict(raw)
-            runs = [
-                {name: _stages(predict, raw) for name, predict in predictors.items()} for _ in range(repeats)
-            ]
+                runs[name] = [_stages(predict, raw) for _ in range(repeats)]
         for name in networks:
-            stages = {stage: [run[name][stage] for run in runs] for stage in STAGES}
+            stages = {stage: [run[stage] for run in runs[name]] for stage in STAGES}
             rows.append({"network": name, "points": points, "threads": count} | {"stages": _summary(stages)})
     progress(len(settings), len(settings))
     return rows
@@ -109,9 +110,9 @@ def _timed(module: ModuleType, name: str) -> Iterator[list[float]]:
     """Note the milliseconds of every call that a module makes of one function."""
     function, spent = getattr(module, name), []
 
-    def timed(*arguments: Any) -> Any:
+    def timed(*arguments: Any, **options: Any) -> Any:
         started = time.perf_counter()
-        answer = function(*arguments)
+        answer = function(*arguments, **options)
         spent.append((time.perf_counter() - started) * 1000)
         return answer
 

@@ -9,7 +9,7 @@ from statistics import median
 
 import torch
 from sklearn.neighbors import NearestNeighbors
-from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
+from threadpoolctl import threadpool_limits
 from torch import Tensor
 
 from benchmarks.clouds import Clouds

@@ -108,3 +108,16 @@ def test_normalized_clouds_are_centred_and_in_units_of_three_metres(seed: int, o
     assert np.abs(found.mean(axis=1, dtype=np.float64)).max() < 1e-6
     np.testing.assert_allclose(found[0] * 3, points - points.mean(axis=0, dtype=np.float64), atol=1e-5)
     np.testing.assert_array_equal(found[1], normalize(points * 2))
+
+
+def test_thinning_names_the_pixels_of_the_whole_cloud() -> None:
+    rng = np.random.default_rng(0)
+    image = rng.uniform(1, 3, (96, 128, 3)).astype(np.float32)
+    image[::3, ::5] = np.nan
+    points, indices = prepare_cloud(image, 140, thin=True)
+    np.testing.assert_array_equal(image.reshape(-1, 3)[indices], points)
+    rows, columns = np.divmod(indices, 128)
+    step = 2  # 48 x 64 = 3072 pixels; every third row and column would leave fewer than 16 x 140
+    assert set(rows % step) == set(columns % step) == {0}
+    few = prepare_cloud(image[:16, :16], 140, thin=True)
+    np.testing.assert_array_equal(few.points, prepare_cloud(image[:16, :16], 140).points)

@@ -22,7 +22,8 @@ from doorstate.types import STATES
 
 @pytest.fixture(scope="module")
 def predictor() -> Predictor:
-    return Predictor(create_network("pointnet2"), WeightsCard(network="pointnet2", num_points=160), 160)
+    card = WeightsCard(network="pointnet2", num_points=160)
+    return Predictor(create_network("pointnet2"), card, 160, thin=False)
 
 
 def test_it_answers_what_the_network_says_of_the_prepared_cloud(
@@ -48,6 +49,17 @@ def test_organized_flat_and_shuffled_clouds_give_one_answer(
     assert predictor(raw).probabilities == predictor(flat).probabilities
     measured = flat[np.isfinite(flat).all(axis=1)]
     assert predictor(measured).probabilities == predictor(flat).probabilities
+
+
+def test_thinning_takes_the_points_from_some_pixels(small_dataset: PreparedDataset) -> None:
+    raw = replay(unflatten(small_dataset.rows[1])).points  # (480, 640, 3)
+    card = WeightsCard(network="pointnet2", num_points=160)
+    quick = Predictor(create_network("pointnet2"), card, 160)
+    step = 10  # 48 x 64 = 3072 pixels are the fewest above 16 x 160
+    every = Predictor(quick.network, card, 160, thin=False)
+    assert quick(raw).probabilities == every(raw[::step, ::step]).probabilities
+    assert quick(raw).probabilities != every(raw).probabilities
+    assert quick(raw.reshape(-1, 3)).probabilities == every(raw).probabilities  # neighbours in no image
 
 
 def test_fewer_points_than_trained_with_are_used_as_they_are(predictor: Predictor) -> None:

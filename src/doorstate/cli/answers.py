@@ -48,10 +48,12 @@ def predict(
     from doorstate.clouds.io import find_clouds
     from doorstate.console import err, print_table, progress_bar
     from doorstate.deployment.predictor import Predictor
+    from doorstate.training.environment import keep_freed_memory
     from doorstate.types import STATES
 
     options = read_options(frame, roll, units, depth_scale, intrinsics, (fx, fy, cx, cy))
     found = find_clouds(files)
+    keep_freed_memory()
     predictor = Predictor.load(weights or network, points)
     predictor.warm_up()
     rows: list[list[str]] = []

@@ -32,20 +32,34 @@ class Prediction:
 
 
 class Predictor:
-    """A network with its weights, and the preparation they were trained with."""
+    """A network with its weights, and the preparation they were trained with.
 
-    def __init__(self, network: PointNetwork, card: WeightsCard, points: int = NUM_POINTS) -> None:
+    Args:
+        network: classifier.
+        card: of its weights.
+        points: how many points to look at.
+        thin: sample the points from some rows and columns of an organized cloud, which is several times quicker,
+            and not from all as in training (clouds.preparation).
+    """
+
+    def __init__(
+        self, network: PointNetwork, card: WeightsCard, points: int = NUM_POINTS, *, thin: bool = True
+    ) -> None:
         self.network = network.eval()
         self.card = card
         self.points = points
+        self.thin = thin
 
     @classmethod
-    def load(cls, name_or_path: str | Path = DEFAULT_NETWORK, points: int | None = None) -> Predictor:
+    def load(
+        cls, name_or_path: str | Path = DEFAULT_NETWORK, points: int | None = None, *, thin: bool = True
+    ) -> Predictor:
         """Load packaged weights by network name, or any weights file by path.
 
         Args:
             name_or_path: a name of `packaged_networks()`, or a `.safetensors` file.
             points: how many points to look at; None takes as many as the weights were trained with.
+            thin: as of the class.
 
         Raises:
             WeightsError: no such weights, or they cannot be used.
@@ -54,7 +68,7 @@ class Predictor:
         if path.suffix != ".safetensors":
             path = packaged_weights(str(name_or_path))
         network, card = load_weights(path)
-        return cls(network, card, points or card.num_points)
+        return cls(network, card, points or card.num_points, thin=thin)
 
     def __call__(self, points: Points) -> Prediction:
         """State of the door in a cloud.
@@ -66,7 +80,7 @@ class Predictor:
             CloudContentError: the cloud cannot be used (clouds.preparation says when).
         """
         started = time.perf_counter()
-        prepared = prepare_cloud(points, self.points)
+        prepared = prepare_cloud(points, self.points, thin=self.thin)
         with torch.inference_mode():
             logits = self.network(torch.from_numpy(normalize(prepared.points))[None])
             probabilities = logits.softmax(1)[0].numpy()

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from typing import cast
+
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
@@ -125,5 +127,7 @@ class DGCNN(PointNetwork):
         """(B, 2048) maximum and mean over the points, whatever their order."""
         order, neighbours = neighbourhoods or self.neighbourhoods(points)
         edges = self.edge_features(gather_rows(points, order), neighbours)
-        rows = self.aggregate(torch.cat(edges, dim=-1))  # (B, N, 1024)
+        linear, norm = cast(nn.Linear, self.aggregate[0]), cast(RowBatchNorm, self.aggregate[1])
+        rows = norm.after(linear, torch.cat(edges, dim=-1))  # (B, N, 1024)
+        rows = functional.leaky_relu_(rows, _SLOPE)
         return torch.cat([max_over_points(rows), rows.mean(dim=1)], dim=-1)

@@ -16,6 +16,7 @@ from torch.autograd.function import once_differentiable
 from torch.nn import functional
 
 _VALUES_PER_PIECE = 2**18  # 1 MiB of float32
+_BITS = {2: torch.int16, 4: torch.int32, 8: torch.int64}
 _GROUP = 64  # points of which only the largest are compared further
 
 
@@ -127,19 +128,22 @@ def _pieces(count: int, values_each: int) -> Iterator[slice]:
 
 
 def _first_winner(values: Tensor) -> tuple[Tensor, Tensor]:
-    """Maximum over axis 1 of (G, K, C) values and the first index that has it.
+    """Maximum over axis 1 of (G, K, C) values and the first index that has it, int64.
 
-    Three vectorised passes: torch.max with indices over an axis that is not the last compares one by one.
+    A few vectorised passes: torch.max with indices over an axis that is not the last compares one by one.
     """
     num_points = values.shape[1]
     largest = values.amax(1, keepdim=True)
-    whole = {2: torch.int16, 4: torch.int32, 8: torch.int64}[
-        values.element_size()
-    ]  # equal bits are told quicker
-    kind = torch.int8 if num_points < 2**7 else torch.int16 if num_points < 2**15 else torch.int32
-    from_end = torch.arange(num_points, 0, -1, dtype=kind, device=values.device).view(1, -1, 1)
-    has_it = (values.view(whole) == largest.view(whole)).view(torch.int8)
-    return largest.squeeze(1), num_points - (has_it * from_end).amax(1).clamp_min_(1)  # NaN may equal none
+    if values.element_size() > 2:
+        slots = torch.arange(num_points, dtype=values.dtype, device=values.device).view(1, -1, 1)
+        behind = (largest - values).sign_()  # 0 where a value is the largest, else 1
+        winner = torch.add(slots, behind, alpha=num_points).amin(1)
+    else:  # too few digits to count with
+        kind = torch.int8 if num_points < 2**7 else torch.int16 if num_points < 2**15 else torch.int32
+        from_end = torch.arange(num_points, 0, -1, dtype=kind, device=values.device).view(1, -1, 1)
+        has_it = (values.view(torch.int16) == largest.view(torch.int16)).view(torch.int8)
+        winner = num_points - (has_it * from_end).amax(1)
+    return largest.squeeze(1), winner.long().clamp_(0, num_points - 1)  # nothing equals NaN
 
 
 def _neighbour_amax(values: Tensor, indices: Tensor) -> Tensor:
@@ -169,7 +173,7 @@ class _NeighbourMax(torch.autograd.Function):
         for piece in _pieces(len(rows), k * channels):
             neighbours = flat.index_select(0, rows[piece].flatten()).view(-1, k, channels)
             out[piece], slot = _first_winner(neighbours)
-            torch.gather(rows[piece], 1, slot.long(), out=winners[piece])
+            torch.gather(rows[piece], 1, slot, out=winners[piece])
         ctx.save_for_backward(winners)
         ctx.shape = values.shape
         return out.view(batch, num_queries, channels)
@@ -222,7 +226,9 @@ class _MaxOverPoints(torch.autograd.Function):
     def backward(ctx: Any, grad: Tensor) -> Tensor:
         (winners,) = ctx.saved_tensors
         spread = grad.new_zeros(ctx.shape)
-        spread.flatten(0, -3).scatter_(1, winners.unsqueeze(1), grad.reshape(len(winners), 1, -1))
+        bits = _BITS[grad.element_size()]  # moved as integers: torch scatters bfloat16 four times as slowly
+        groups, moved = spread.view(bits).flatten(0, -3), grad.contiguous().view(bits)
+        groups.scatter_(1, winners.unsqueeze(1), moved.view(len(winners), 1, -1))
         return spread
 
 
@@ -254,7 +260,7 @@ def _winner_in_groups(values: Tensor) -> tuple[Tensor, Tensor]:
     """Maximum over the (N, C) values of each channel and the first index that has it."""
     if len(values) % _GROUP:
         largest, winner = _first_winner(values.unsqueeze(0))
-        return largest[0], winner[0].long()
+        return largest[0], winner[0]
     groups = values.view(-1, _GROUP, values.shape[1])
     largest, group = groups.amax(1).max(0)  # (C,)
     members = groups.gather(0, group.view(1, 1, -1).expand(1, _GROUP, -1))  # (1, 64, C)
@@ -267,10 +273,12 @@ class _WithMoments(torch.autograd.Function):
         count, channels = rows.shape
         wide = torch.promote_types(rows.dtype, torch.float32)
         mean = rows.mean(0, dtype=wide)
+        centre = mean.to(rows.dtype)
         covariance = torch.zeros(channels, channels, dtype=wide, device=rows.device)
         for piece in _pieces(count, 2 * channels):
-            centred = rows[piece] - mean
-            covariance.addmm_(centred.T, centred, alpha=1 / count)
+            centred = rows[piece] - centre
+            covariance += centred.T @ centred
+        covariance = covariance / count - torch.outer(mean - centre, mean - centre)
         ctx.save_for_backward(rows, mean)
         return rows.view_as(rows), mean, covariance
 

@@ -15,9 +15,10 @@ from torch import Tensor
 from doorstate.networks.ops import at_least_float32, full_precision, gather_rows
 
 _DISTANCES_PER_BLOCK = 2**19  # 2 MiB of float32 stay in a core's cache
-_BLOCK_SIZES = range(16, 33)
+_BLOCK_SIZES = range(12, 24)
 _FEWEST_POINTS = 1024  # below, all distances are cheaper than choosing which to compute
 _ROUNDING = 1e-5  # of squared float32 distances, relative to the largest squared norm; ten times what is seen
+_POINTS_AT_ONCE = 512  # of a ball query: most balls are full after few points
 _FAR, _NOBODY = 1e30, 2**31 - 1
 
 
@@ -67,13 +68,10 @@ def knn(query: Tensor, points: Tensor, k: int, *, in_order: bool = False) -> Ten
         if not _blocks_pay(query, points, k):
             return _nearest_of_all(at_least_float32(query), at_least_float32(points), k)
         names = torch.arange(points.shape[1], device=points.device).expand(len(points), -1)
-        own = torch.where((query == points).all(-1), names, -1)
         if in_order:
-            return _nearest_in_blocks(query, points, own, names, k)
+            return _nearest_in_blocks(query, points, names, k)
         order = spatial_order(points)
-        found = _nearest_in_blocks(
-            gather_rows(query, order), gather_rows(points, order), own.gather(1, order), order, k
-        )
+        found = _nearest_in_blocks(gather_rows(query, order), gather_rows(points, order), order, k)
         return torch.empty_like(found).scatter_(1, order.unsqueeze(-1).expand_as(found), found)
 
 
@@ -89,18 +87,48 @@ def ball_query(centres: Tensor, points: Tensor, radius: float, num_samples: int)
     Returns:
         (B, M, num_samples) int64 indices into points.
     """
+    centres, points = at_least_float32(centres.detach()), at_least_float32(points.detach())
+    with full_precision(points):
+        if torch.compiler.is_exporting():
+            return _first_hits_of_all(centres, points, radius, num_samples)
+        clouds = zip(centres, points, strict=True)
+        return torch.stack([_first_hits(*cloud, radius, num_samples) for cloud in clouds])
+
+
+def _first_hits(centres: Tensor, points: Tensor, radius: float, num_samples: int) -> Tensor:
+    """`ball_query` of one cloud, which leaves a centre alone as soon as its slots are full."""
+    slots = torch.arange(num_samples, device=points.device)
+    found = slots.new_zeros(len(centres) * num_samples)
+    count = slots.new_zeros(len(centres))
+    open_centres = torch.arange(len(centres), device=points.device)
+    for start in range(0, len(points), _POINTS_AT_ONCE):
+        some = points[None, start : start + _POINTS_AT_ONCE]
+        squared = _coordinate_distances(centres[None].index_select(1, open_centres), some)[0]
+        row, column = (squared < radius**2).nonzero(as_tuple=True)  # by row, then by column
+        hits = row.bincount(minlength=len(open_centres))
+        first = hits.cumsum(0) - hits - count.index_select(0, open_centres)
+        slot = torch.arange(len(row), device=row.device) - first.index_select(0, row)
+        kept = (slot < num_samples).nonzero().squeeze(1)
+        place = open_centres.index_select(0, row[kept]) * num_samples + slot[kept]
+        found.index_copy_(0, place, column[kept] + start)
+        count.index_add_(0, open_centres, hits)
+        open_centres = (count < num_samples).nonzero().squeeze(1)
+        if not len(open_centres):
+            break
+    found = found.view(-1, num_samples)
+    return torch.where(slots < count.unsqueeze(1), found, found[:, :1])
+
+
+def _first_hits_of_all(centres: Tensor, points: Tensor, radius: float, num_samples: int) -> Tensor:
+    """`ball_query` as one graph, whose shapes do not depend on the points."""
     num_points = points.shape[1]
-    # Indices as float32 (exact up to 2^24): topk on floats is twice as fast as on integers.
-    index = torch.arange(num_points, device=points.device, dtype=torch.float32)
     k = min(num_samples, num_points)
-    found = []
-    for _, _, squared in _distance_blocks(centres, points):
-        hits = torch.where(squared < radius**2, index, float(num_points))
-        found.append(hits.topk(k, largest=False).values)
-    hits = torch.cat(found, dim=1).long()  # (B, M, k), num_points where there are no more
-    first = hits[..., :1]
-    hits = torch.where(hits < num_points, hits, first)
-    return torch.cat([hits, first.expand(-1, -1, num_samples - k)], dim=-1)
+    hits = _coordinate_distances(centres, points) < radius**2
+    index = torch.where(hits, torch.arange(num_points, device=points.device), num_points)
+    index = index.topk(k, largest=False).values  # (B, M, k), num_points where there are no more
+    first = index[..., :1]
+    index = torch.where(index < num_points, index, first)
+    return torch.cat([index, first.expand(-1, -1, num_samples - k)], dim=-1)
 
 
 def _nearest_of_all(query: Tensor, points: Tensor, k: int) -> Tensor:
@@ -130,66 +158,68 @@ def _blocks_pay(query: Tensor, points: Tensor, k: int) -> bool:
     )
 
 
-def _nearest_in_blocks(query: Tensor, points: Tensor, own: Tensor, names: Tensor, k: int) -> Tensor:
-    """Nearest neighbours of runs of queries in those runs of points that can hold any.
+def _nearest_in_blocks(query: Tensor, points: Tensor, names: Tensor, k: int) -> Tensor:
+    """Nearest neighbours of runs of points among those runs of points that can hold any.
 
     A run of points has a centre and a radius. By the triangle inequality it can be left out for a query whose
     distance to the centre, less the radius, exceeds what k points closer by are known to be within.
 
     Args:
-        query: (B, M, D).
+        query: (B, N, D).
         points: (B, N, D).
-        own: (B, M) name of the point a query is, or -1.
         names: (B, N) what each point is called in the result.
         k: number of neighbours.
 
     Returns:
-        (B, M, k) names, by distance and then by name.
+        (B, N, k) names, by distance and then by name; first the point that a query is.
     """
-    batch, _, dimensions = query.shape
+    batch, _, dimensions = points.shape
+    size = _block_size(points.shape[1])
+    itself = (query == points).all(-1).view(-1, size, 1)
     origin = points.mean(dim=1, keepdim=True)  # far from the origin, squares lose the digits that matter
     query, points = query - origin, points - origin
-    blocks = points.view(batch, -1, _block_size(points.shape[1]), dimensions)  # (B, P, p, D)
-    runs = query.view(batch, -1, _block_size(query.shape[1]), dimensions)  # (B, Q, q, D)
-    (num_blocks, block_size), (num_runs, run_size) = blocks.shape[1:3], runs.shape[1:3]
+    blocks = points.view(batch, -1, size, dimensions)  # (B, P, p, D)
+    num_blocks = blocks.shape[1]
     centres = blocks.mean(2)  # (B, P, D)
     radii = (blocks - centres.unsqueeze(2)).square().sum(-1).amax(2).sqrt()  # (B, P)
     slack = _ROUNDING * points.square().sum(-1).amax(1).view(batch, 1, 1)  # (B, 1, 1)
 
-    left, right = _factors(runs, blocks)
-    right, labels = right.flatten(0, 1), names.reshape(-1, block_size)  # of B * P blocks
+    left, right = _factors(query.view_as(blocks), blocks)
+    left, right = left.flatten(0, 1), right.flatten(0, 1)  # (B * P, p, D + 2)
     # One more block, far away, fills lists of blocks that are shorter than others.
-    far = right.new_zeros(1, block_size, dimensions + 2)
+    far = right.new_zeros(1, size, dimensions + 2)
     far[..., -1] = _FAR
     right = torch.cat([right, far])
-    labels = torch.cat([labels, labels.new_full((1, block_size), _NOBODY)])
+    labels = torch.cat([names.reshape(-1, size), names.new_full((1, size), _NOBODY)])
     first_block = num_blocks * torch.arange(batch, device=points.device).view(-1, 1, 1)
 
     def distances(chosen: Tensor, lists: Tensor) -> Tensor:
-        """(g, q, n * p) squared distances of chosen runs to the blocks in their lists (g, n)."""
+        """(g, p, n * p) squared distances of chosen runs to the blocks in their lists (g, n)."""
         candidates = right.index_select(0, lists.flatten()).view(len(lists), -1, dimensions + 2)
         return torch.bmm(left.index_select(0, chosen), candidates.mT).clamp_min_(torch.finfo(left.dtype).tiny)
 
-    left = left.flatten(0, 1)  # (B * Q, q, D + 2)
+    near = torch.cdist(centres, centres).topk(ceil(1.5 * k / size), largest=False).indices
     every = torch.arange(len(left), device=points.device)
-    near = torch.cdist(runs.mean(2), centres).topk(ceil(1.5 * k / block_size), largest=False).indices
     bound = distances(every, (near + first_block).flatten(0, 1)).kthvalue(k).values.view(batch, -1, 1)
-    reach = (bound + slack).sqrt() + radii.unsqueeze(1)  # (B, M, P)
+    reach = (bound + slack).sqrt() + radii.unsqueeze(1)  # (B, N, P)
     to_centre = torch.bmm(*_factors(query, centres, transpose=True)) - slack
-    needed = (to_centre <= reach.square_()).view(batch, num_runs, run_size, num_blocks).any(2)  # (B, Q, P)
+    needed = (to_centre <= reach.square_()).view(batch, num_blocks, size, num_blocks).any(2)  # (B, P, P)
+    needed.diagonal(dim1=1, dim2=2).fill_(True)
 
     count, order = needed.sum(2).flatten().sort()
     lists = needed.byte().argsort(dim=2, descending=True, stable=True)
     lists = torch.where(needed.gather(2, lists), lists + first_block, len(right) - 1).flatten(0, 1)
-    found = names.new_empty(batch * num_runs, run_size, k)
-    own = own.view(-1, run_size, 1)
-    for chosen, width in _chunks(order, count, run_size * block_size):
+    before = needed.cumsum(2).diagonal(dim1=1, dim2=2).reshape(-1, 1, 1) - 1  # blocks listed before one's own
+    own = before * size + torch.arange(size, device=points.device).view(1, -1, 1)  # (B * P, p, 1) its column
+    found = names.new_empty(len(left), size, k)
+    for chosen, width in _chunks(order, count, size * size):
         shortened = lists.index_select(0, chosen)[:, :width]
         squared = distances(chosen, shortened)
-        name = labels.index_select(0, shortened.flatten()).view(len(chosen), 1, -1)  # (g, 1, n * p)
-        squared.masked_fill_(own.index_select(0, chosen) == name, 0)
+        column = own.index_select(0, chosen)
+        squared.scatter_(2, column, squared.gather(2, column).masked_fill_(itself.index_select(0, chosen), 0))
         # Bits of positive floats sort as the floats do; the name below them settles ties.
-        keys = squared.view(torch.int32).long().bitwise_left_shift_(32).bitwise_or_(name)
+        keys = squared.view(torch.int32).long().bitwise_left_shift_(32)
+        keys.bitwise_or_(labels.index_select(0, shortened.flatten()).view(len(chosen), 1, -1))
         found[chosen] = keys.topk(k, largest=False).values.bitwise_and_(2**32 - 1)
     return found.view(batch, -1, k)
 
