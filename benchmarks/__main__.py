@@ -56,6 +56,9 @@ def networks(
         bool,
         typer.Option("--same-allocator", help="Let every form keep freed memory, not the fast ones alone."),
     ] = False,
+    compiled: Annotated[
+        bool, typer.Option("--compiled", help="The quickest form through torch.compile too.")
+    ] = False,
     fresh: Annotated[
         bool, typer.Option("--fresh", help="Measure again what is stored in the folder.")
     ] = False,
@@ -78,7 +81,7 @@ def networks(
     names, counts = _names(networks), _counts(points)
     given = {"pointnet": port_pointnet, "pointnet2": port_pointnet, "dgcnn": port_dgcnn}
     checkouts = {name: path for name, path in given.items() if path is not None}
-    plan = Plan(batch, repeats, threads, checkouts, pyg, same_allocator)
+    plan = Plan(batch, repeats, threads, checkouts, pyg, same_allocator, compiled)
     settings = _settings(
         batch=batch,
         repeats=repeats,
@@ -87,6 +90,7 @@ def networks(
         ports=" ".join(checkouts),
         pyg=pyg,
         same_allocator=same_allocator,
+        compiled=compiled,
     )
     needed = max(batch, *INFERENCE_BATCHES)
 
@@ -165,6 +169,48 @@ def knn(out: Out, points: Points = _ALL_POINTS, repeats: Repeats = 5, threads: T
     table = knn_table(rows)
     write_once(out, "knn", _settings(threads=threads, repeats=repeats), rows, table)
     _tell(table, out / "knn.md")
+
+
+@app.command()
+def curves(
+    out: Out,
+    data: Annotated[Path, typer.Option(help="A prepared data set.")],
+    network: Annotated[str, typer.Option(help="Which network.")] = "pointnet",
+    points: Annotated[int, typer.Option(help="Points per cloud.", min=128)] = 512,
+    epochs: Annotated[int, typer.Option(help="Length of both trainings.", min=1)] = 8,
+    fold: Annotated[int, typer.Option(help="Of protocol paper.", min=0, max=4)] = 0,
+    runs: Annotated[Path, typer.Option(help="Folder of the two runs, which are resumable.")] = Path("runs"),
+) -> None:
+    """Train one fold with fast and with plain layers from the same seed.
+
+    \b
+    Example:
+      python -m benchmarks curves --data data/ogurob-4096 --network dgcnn --points 256 --epochs 4 --out reports/speed
+    """
+    from benchmarks.curves import curves_table, draw_curves, train_both
+    from benchmarks.store import write_once
+    from doorstate.dataset.splits import draw_splits
+    from doorstate.dataset.store import open_dataset
+    from doorstate.training.fit import RunConfig
+    from doorstate.training.recipes import COMMON
+
+    (name,) = _names(network)
+    dataset = open_dataset(data)
+    recipe = COMMON.model_copy(update={"epochs": epochs})
+    config = RunConfig(
+        network=name,
+        dataset=dataset.description.source,
+        protocol="paper",
+        fold=fold,
+        num_points=points,
+        seed=0,
+        recipe=recipe,
+    )
+    rows = train_both(config, dataset, draw_splits(dataset.rows, "paper", 0)[fold], runs / "curves")
+    table, title = curves_table(rows), f"curves-{name}"
+    write_once(out, title, _settings(points=points, epochs=epochs, fold=fold, data=str(data)), rows, table)
+    draw_curves(rows, out, title)
+    _tell(table, out / f"{title}.md")
 
 
 def main() -> None:

@@ -15,7 +15,7 @@ from benchmarks.pyg import NETWORKS as PYG_NETWORKS
 from benchmarks.pyg import build_pyg
 from doorstate.networks import create_network
 from doorstate.networks.base import PointNetwork
-from doorstate.training.environment import bf16_is_quick
+from doorstate.training.environment import bf16_is_quick, compiled
 
 _PLAIN_FORMS = Path(__file__).resolve().parents[1] / "tests" / "networks"
 
@@ -27,13 +27,14 @@ class Form(NamedTuple):
     kind: Literal["fast", "plain", "port", "pyg"]
     bf16: bool = False
     cached: bool = False
+    compiled: bool = False
 
 
 PLAIN, PORT, PYG = Form("plain fp32", "plain"), Form("port", "port"), Form("pyg", "pyg")
 BASELINES = (PLAIN, PORT, PYG)
 
 
-def forms_of(network: str, port: bool, pyg: bool) -> list[Form]:
+def forms_of(network: str, port: bool, pyg: bool, compiled: bool = False) -> list[Form]:
     """Forms a network is timed in, in the order in which they alternate."""
     bf16 = bf16_is_quick()
     best = "fast bf16" if bf16 else "fast fp32"
@@ -41,6 +42,7 @@ def forms_of(network: str, port: bool, pyg: bool) -> list[Form]:
     forms += [Form("fast bf16", "fast", bf16=True)] if bf16 else []
     # PointNet looks at no neighbours.
     forms += [Form(f"{best}, neighbours cached", "fast", bf16, cached=True)] if network != "pointnet" else []
+    forms += [Form(f"{best}, compiled", "fast", bf16, compiled=True)] if compiled else []
     forms.append(PLAIN)
     forms += [PORT] if port else []
     forms += [PYG] if pyg and network in PYG_NETWORKS else []
@@ -60,6 +62,8 @@ def build_form(form: Form, network: str, checkout: Path | None, points: Tensor) 
     ours = create_network(network)
     if form.kind == "plain":
         return plain_form(ours)
+    if form.compiled:
+        ours.__dict__["training_loss"] = compiled(ours.training_loss)
     return _WithNeighbours(ours, points) if form.cached else ours
 
 

@@ -235,3 +235,19 @@ class Dying:
 
     def die(self) -> None:
         os.kill(os.getpid(), 9)
+
+
+def test_both_forms_train_alike(small_dataset: PreparedDataset, tmp_path: Path) -> None:
+    code, output, errors = run(
+        "curves",
+        *("--data", small_dataset.folder, "--network", "pointnet2", "--points", 128, "--epochs", 2),
+        *("--runs", tmp_path / "runs", "--out", tmp_path / "curves"),
+    )
+    assert (code, errors) == (0, "")
+    _, rows, markdown = stored(tmp_path / "curves", "curves-pointnet2")
+    fast, plain = rows
+    for a, b in zip(fast["log"], plain["log"], strict=True):
+        assert a["train_loss"] == pytest.approx(b["train_loss"], rel=0.2)
+    assert "| test |" in markdown
+    assert (tmp_path / "curves" / "curves-pointnet2.png").read_bytes().startswith(b"\x89PNG")
+    assert "fast and plain: pointnet2" in output

@@ -169,3 +169,18 @@ def test_network_is_one_graph_for_any_batch(name: str) -> None:
     program = torch.export.export(network, (clouds(128),), dynamic_shapes=({0: batch},))
     points = clouds(128, batch=3, seed=1)
     torch.testing.assert_close(program.module()(points), network(points))
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("training", [True, False])
+def test_every_tensor_is_made_on_the_points_device(name: str, training: bool) -> None:
+    """On torch's meta device, which computes shapes alone and stands for any that is not the CPU."""
+    network = create_network(name).train(training)
+    neighbourhoods = tuple(index.to("meta") for index in network.neighbourhoods(clouds(128)))
+    network.to("meta")
+    loss, logits = network.training_loss(
+        clouds(128).to("meta"), LABELS.to("meta"), neighbourhoods=neighbourhoods
+    )
+    assert loss.device.type == logits.device.type == "meta"
+    loss.backward()
+    assert all(p.grad is not None and p.grad.device.type == "meta" for p in network.parameters())

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 import torch
 from sklearn.metrics import f1_score
+from torch._dynamo.exc import TorchDynamoException
 
 from doorstate.clouds.augment import Augmentation
 from doorstate.dataset.splits import Role, draw_splits
@@ -241,3 +243,34 @@ def test_kept_neighbours_train_the_same_network(
     ]
     for name, value in weights[0].items():
         assert torch.equal(value, weights[1][name]), name
+
+
+@pytest.mark.parametrize("works", [True, False])
+def test_compiling_is_an_option_that_falls_back(
+    small_dataset: PreparedDataset,
+    roles: dict[str, Role],
+    finished: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+    works: bool,
+) -> None:
+    calls: list[int] = []
+
+    def fake_compile(function: Callable[..., Any]) -> Callable[..., Any]:
+        def call(*arguments: Any, **options: Any) -> Any:
+            calls.append(1)
+            if not works:
+                raise TorchDynamoException("no C++ compiler\nlong story")
+            return function(*arguments, **options)
+
+        return call
+
+    monkeypatch.setattr(torch, "compile", fake_compile)
+    recipe = RECIPE.model_copy(update={"compile": True})
+    metrics = fit(config(recipe=recipe), small_dataset, roles, tmp_path / "compiled")
+    expected = json.loads((finished / "metrics.json").read_text(encoding="utf-8"))
+    assert metrics["test_macro_f1"] == expected["test_macro_f1"]
+    assert (len(calls) > 1) == works
+    warned = [record.getMessage() for record in caplog.records if record.name.startswith("doorstate")]
+    assert warned == ([] if works else ["torch.compile failed (no C++ compiler): running uncompiled"])

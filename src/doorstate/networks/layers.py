@@ -16,7 +16,8 @@ from doorstate.networks.ops import (
     full_precision,
     gather_rows,
     linear_max,
-    max_over_points,
+    linear_norm_max,
+    linear_relu,
     with_moments,
 )
 
@@ -41,6 +42,13 @@ class RowBatchNorm(nn.BatchNorm1d):
             return functional.linear(rows, weight, bias)
         out = functional.linear(rows, linear.weight)
         return self(out) if linear.bias is None else self.without_bias(out, linear.bias)
+
+    def max_after(self, linear: nn.Linear, groups: Tensor) -> Tensor:
+        """(G, C') maximum over the points of (G, K, C) groups of normalised outputs of a linear layer, in training."""
+        shift = self.bias + 0 * linear.bias  # as in `without_bias`
+        out, mean, variance = linear_norm_max(groups, linear.weight, self.weight, shift, self.eps)
+        self._follow(mean + linear.bias, variance, count=groups.shape[0] * groups.shape[1])
+        return out
 
     def without_bias(self, rows: Tensor, bias: Tensor) -> Tensor:
         """Normalise rows that lack a bias in training; only the running mean needs it, and its gradient is zero."""
@@ -189,13 +197,19 @@ class PointMLP(nn.Module):
         self, offsets: Tensor, features: Tensor | None = None, indices: Tensor | None = None
     ) -> Tensor:
         """Same arguments as `PointLinear.forward`; returns (B, ..., channels[-1])."""
-        if self.training:
-            rows = self.first(offsets, features, indices, (self.first.weight, None))
-            rows = self.norm.without_bias(rows, self.first.bias)
-        else:
-            rows = self.first(offsets, features, indices, self.norm.fold(self.first))
-        out: Tensor = self.rest(rows.relu_())
+        out: Tensor = self.rest(self._first(offsets, features, indices))
         return out
+
+    def _first(self, offsets: Tensor, features: Tensor | None, indices: Tensor | None) -> Tensor:
+        if not self.training:
+            out: Tensor = self.first(offsets, features, indices, self.norm.fold(self.first))
+            return out.relu_()
+        if features is None:
+            rows, *moments = with_moments(offsets.flatten(0, -2))
+            folded = self.norm.fold(self.first, (moments[0], moments[1]), count=len(rows))
+            return linear_relu(rows, *folded).view(*offsets.shape[:-1], -1)
+        out = self.first(offsets, features, indices, (self.first.weight, None))
+        return self.norm.without_bias(out, self.first.bias).relu_()
 
 
 class DenseMax(nn.Module):
@@ -208,7 +222,7 @@ class DenseMax(nn.Module):
 
     def forward(self, rows: Tensor) -> Tensor:
         # ReLU is monotone, so it may follow the maximum, where there are K times fewer rows.
-        return self._largest(rows).relu()
+        return torch.relu(self._largest(rows))
 
     def _largest(self, rows: Tensor) -> Tensor:
         groups = rows.flatten(0, -3)  # (G, K, C)
@@ -216,7 +230,7 @@ class DenseMax(nn.Module):
         if not self.training:
             return linear_max(groups, *self.norm.fold(self.linear)).view(shape)
         if groups.shape[1] < _MANY_POINTS:
-            return max_over_points(self.norm.after(self.linear, rows))
+            return self.norm.max_after(self.linear, groups).view(shape)
         groups = groups.to(autocast_type(groups))
         flat, *moments = with_moments(groups.flatten(0, 1))
         folded = self.norm.fold(self.linear, (moments[0], moments[1]), count=len(flat))

@@ -15,15 +15,14 @@ from torch import Tensor
 from torch.autograd.function import once_differentiable
 from torch.nn import functional
 
-_VALUES_PER_PIECE = 2**18  # 1 MiB of float32
+_VALUES_PER_PIECE = 2**19  # 2 MiB of float32
 _BITS = {2: torch.int16, 4: torch.int32, 8: torch.int64}
 _GROUP = 64  # points of which only the largest are compared further
 
 
 def full_precision(tensor: Tensor) -> AbstractContextManager[object]:
     """Context in which autocast leaves operations on the tensor's device alone."""
-    device = tensor.device.type
-    return torch.autocast(device, enabled=False) if torch.is_autocast_enabled(device) else nullcontext()
+    return torch.autocast(tensor.device.type, enabled=False) if _is_autocast(tensor) else nullcontext()
 
 
 def at_least_float32(values: Tensor) -> Tensor:
@@ -33,8 +32,7 @@ def at_least_float32(values: Tensor) -> Tensor:
 
 def autocast_type(tensor: Tensor) -> torch.dtype:
     """Type that autocast would compute a product with this tensor in."""
-    device = tensor.device.type
-    return torch.get_autocast_dtype(device) if torch.is_autocast_enabled(device) else tensor.dtype
+    return torch.get_autocast_dtype(tensor.device.type) if _is_autocast(tensor) else tensor.dtype
 
 
 def gather_rows(values: Tensor, indices: Tensor) -> Tensor:
@@ -96,6 +94,44 @@ def linear_max(rows: Tensor, weight: Tensor, bias: Tensor) -> Tensor:
         return _max_linear(rows, weight) + bias
 
 
+def linear_relu(rows: Tensor, weight: Tensor, bias: Tensor) -> Tensor:
+    """ReLU(W x + b) of coordinates in their own precision, rounded once to the type autocast asks for.
+
+    Args:
+        rows: (R, C), C small.
+        weight: (C', C).
+        bias: (C',).
+
+    Returns:
+        (R, C').
+    """
+    kind = autocast_type(rows)
+    with full_precision(rows):
+        if not _wants_gradient(rows, weight):
+            return functional.linear(rows, weight, bias).relu_().to(kind)
+        return _relu_linear(rows, weight, bias, kind)
+
+
+def linear_norm_max(
+    groups: Tensor, weight: Tensor, scale: Tensor, shift: Tensor, eps: float
+) -> tuple[Tensor, Tensor, Tensor]:
+    """max over points of BatchNorm(W x) with the batch's statistics, the normalised rows never written.
+
+    Args:
+        groups: (G, K, C).
+        weight: (C', C).
+        scale: (C',) of the normalisation, of either sign.
+        shift: (C',) of the normalisation.
+        eps: of the normalisation.
+
+    Returns:
+        (G, C') in the type autocast asks for; (C',) mean and (C',) variance of W x, divided by G K, without gradient.
+    """
+    kind = autocast_type(groups)
+    with full_precision(groups):
+        return _norm_max(groups.to(kind), weight, scale, shift, eps)
+
+
 def with_moments(rows: Tensor) -> tuple[Tensor, Tensor, Tensor]:
     """Rows as they are, their mean and their covariance, sharing one gradient.
 
@@ -109,6 +145,11 @@ def with_moments(rows: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         (R, C) rows, (C,) mean and (C, C) covariance divided by R, both at least float32.
     """
     return _moments(rows)
+
+
+def _is_autocast(tensor: Tensor) -> bool:
+    device = tensor.device.type
+    return torch.amp.is_autocast_available(device) and torch.is_autocast_enabled(device)
 
 
 def _wants_gradient(*tensors: Tensor) -> bool:
@@ -226,9 +267,7 @@ class _MaxOverPoints(torch.autograd.Function):
     def backward(ctx: Any, grad: Tensor) -> Tensor:
         (winners,) = ctx.saved_tensors
         spread = grad.new_zeros(ctx.shape)
-        bits = _BITS[grad.element_size()]  # moved as integers: torch scatters bfloat16 four times as slowly
-        groups, moved = spread.view(bits).flatten(0, -3), grad.contiguous().view(bits)
-        groups.scatter_(1, winners.unsqueeze(1), moved.view(len(winners), 1, -1))
+        _put(spread.flatten(0, -3), winners.unsqueeze(1), grad.reshape(len(winners), 1, -1))
         return spread
 
 
@@ -254,6 +293,81 @@ class _LinearMax(torch.autograd.Function):
         spread = torch.zeros_like(flat)
         spread.index_add_(0, places, (grad.unsqueeze(-1) * weight).flatten(0, 1))
         return spread.view_as(rows), weight_grad
+
+
+class _LinearReLU(torch.autograd.Function):
+    @staticmethod
+    def forward(ctx: Any, rows: Tensor, weight: Tensor, bias: Tensor, kind: torch.dtype) -> Tensor:
+        out = rows.new_empty(len(rows), len(weight), dtype=kind)
+        for piece in _pieces(len(rows), len(weight)):
+            out[piece] = torch.addmm(bias, rows[piece], weight.T).relu_()
+        ctx.save_for_backward(rows, weight, out)
+        return out
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, grad: Tensor) -> tuple[Tensor | None, ...]:
+        rows, weight, out = ctx.saved_tensors
+        weight_grad, bias_grad = torch.zeros_like(weight), weight.new_zeros(len(weight))
+        rows_grad = torch.empty_like(rows) if ctx.needs_input_grad[0] else None
+        for piece in _pieces(len(rows), len(weight)):
+            inner = (grad[piece] * out[piece].sign()).to(rows.dtype)
+            weight_grad += inner.T @ rows[piece]
+            bias_grad += inner.sum(0)
+            if rows_grad is not None:
+                torch.mm(inner, weight, out=rows_grad[piece])
+        return rows_grad, weight_grad, bias_grad, None
+
+
+class _LinearNormMax(torch.autograd.Function):
+    @staticmethod
+    def forward(
+        ctx: Any, groups: Tensor, weight: Tensor, scale: Tensor, shift: Tensor, eps: float
+    ) -> tuple[Tensor, Tensor, Tensor]:
+        # With the sign of the scale in the weights, the largest output is the largest after normalisation.
+        sign = torch.where(scale < 0, -1.0, 1.0).to(scale.dtype)
+        signed = (weight * sign.unsqueeze(1)).to(groups.dtype)
+        outputs = functional.linear(groups, signed).flatten(0, 1)
+        one, none = torch.ones_like(scale), torch.zeros_like(scale)
+        outputs, mean, inverse = torch.native_batch_norm(outputs, one, none, None, None, True, 0.0, eps)
+        outputs = outputs.view(*groups.shape[:2], -1)  # (G, K, C') normalised
+        best = outputs.new_empty(len(groups), len(weight))
+        winners = torch.empty(best.shape, dtype=torch.int64, device=groups.device)
+        for piece in _pieces(len(groups), outputs[0].numel()):
+            best[piece], winners[piece] = _first_winner(outputs[piece])
+        ctx.save_for_backward(groups, signed, outputs, winners, best, scale, sign, inverse)
+        variance = inverse.square().reciprocal() - eps
+        ctx.mark_non_differentiable(mean, variance)
+        return (best * scale.abs() + shift).to(groups.dtype), mean * sign, variance
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, grad: Tensor, *_: Tensor) -> tuple[Tensor | None, ...]:
+        """Batch norm's own gradient is affine in its inputs, and only winners have more: no dense gradient is read."""
+        groups, signed, outputs, winners, best, scale, sign, inverse = ctx.saved_tensors
+        kind, count = groups.dtype, outputs.shape[0] * outputs.shape[1]
+        grad = grad.to(scale.dtype)
+        shift_grad, scale_grad = grad.sum(0), (grad * best).sum(0)
+        slope = scale.abs() * inverse
+        factor, constant = -slope * scale_grad / count, (-slope * shift_grad / count).to(kind)
+        factor, won = factor.to(kind), (slope * grad).to(kind).unsqueeze(1)  # (C',), (G, 1, C')
+        weight_grad = scale.new_zeros(signed.shape)
+        groups_grad = torch.empty_like(groups) if ctx.needs_input_grad[0] else None
+        for piece in _pieces(len(groups), outputs[0].numel()):
+            inner = torch.addcmul(constant, outputs[piece], factor)  # (g, K, C')
+            place = winners[piece].unsqueeze(1)
+            _put(inner, place, inner.gather(1, place) + won[piece])
+            flat = inner.flatten(0, 1)
+            weight_grad += flat.T @ groups[piece].flatten(0, 1)
+            if groups_grad is not None:
+                torch.mm(flat, signed, out=groups_grad[piece].view(-1, groups.shape[2]))
+        return groups_grad, weight_grad * sign.unsqueeze(1), scale_grad * sign, shift_grad, None
+
+
+def _put(values: Tensor, places: Tensor, new: Tensor) -> None:
+    """Scatter along axis 1; as integers, because torch scatters bfloat16 four times as slowly."""
+    bits = _BITS[values.element_size()]
+    values.view(bits).scatter_(1, places, new.view(bits))
 
 
 def _winner_in_groups(values: Tensor) -> tuple[Tensor, Tensor]:
@@ -298,4 +412,8 @@ _sum_neighbours: Callable[[Tensor, Tensor], Tensor] = _NeighbourSum.apply
 _max_neighbours: Callable[[Tensor, Tensor], Tensor] = _NeighbourMax.apply
 _max_points: Callable[[Tensor], Tensor] = _MaxOverPoints.apply
 _max_linear: Callable[[Tensor, Tensor], Tensor] = _LinearMax.apply
+_relu_linear: Callable[[Tensor, Tensor, Tensor, torch.dtype], Tensor] = _LinearReLU.apply
+_norm_max: Callable[[Tensor, Tensor, Tensor, Tensor, float], tuple[Tensor, Tensor, Tensor]] = (
+    _LinearNormMax.apply
+)
 _moments: Callable[[Tensor], tuple[Tensor, Tensor, Tensor]] = _WithMoments.apply

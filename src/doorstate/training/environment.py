@@ -4,14 +4,21 @@
 from __future__ import annotations
 
 import ctypes
+import logging
 import platform
 import sys
+from collections.abc import Callable
+from functools import wraps
 from pathlib import Path
+from typing import ParamSpec, TypeVar
 
 import numpy as np
 import torch
 
 from doorstate import __version__
+
+_P = ParamSpec("_P")
+_R = TypeVar("_R")
 
 _M_TRIM_THRESHOLD, _M_MMAP_MAX = -1, -4  # malloc.h of glibc
 
@@ -60,3 +67,24 @@ def bf16_is_quick() -> bool:
     if torch.cuda.is_available():
         return bool(torch.cuda.is_bf16_supported())
     return bool(torch.cpu._is_avx512_bf16_supported() or torch.cpu._is_amx_tile_supported())
+
+
+def compiled(function: Callable[_P, _R]) -> Callable[_P, _R]:
+    """A function through torch.compile, or as it is from the first time that fails, with one warning in the log."""
+    from torch._dynamo.exc import TorchDynamoException  # takes a second to import
+
+    quick: Callable[_P, _R] | None = torch.compile(function)
+
+    @wraps(function)
+    def call(*arguments: _P.args, **options: _P.kwargs) -> _R:
+        nonlocal quick
+        if quick is not None:
+            try:
+                return quick(*arguments, **options)
+            except TorchDynamoException as error:
+                quick = None
+                reason = str(error).strip().partition("\n")[0]
+                logging.getLogger(__name__).warning("torch.compile failed (%s): running uncompiled", reason)
+        return function(*arguments, **options)
+
+    return call

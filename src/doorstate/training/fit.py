@@ -30,7 +30,7 @@ from doorstate.files import atomic_path
 from doorstate.networks import create_network
 from doorstate.networks.base import PointNetwork
 from doorstate.networks.layers import set_batchnorm
-from doorstate.training.environment import bf16_is_quick, describe_environment, keep_freed_memory
+from doorstate.training.environment import bf16_is_quick, compiled, describe_environment, keep_freed_memory
 from doorstate.training.recipes import Recipe, batchnorm_momentum, learning_rate, points_of_epoch
 from doorstate.training.run_folder import RunFolder
 from doorstate.training.weights import WeightsCard, load_into, save_weights
@@ -143,6 +143,8 @@ class _Trainer:
         self.config, self.fabric, self.run = config, fabric, run
         self.dataset, self.samples = dataset, samples
         self.network = network.to(fabric.device)
+        loss = self.network.training_loss
+        self.training_loss = compiled(loss) if config.recipe.compile else loss
         self.optimizer = _optimizer(config.recipe, network)
         self.log: list[dict[str, float]] = []
         self.best: tuple[float, float] = (-1.0, -math.inf)
@@ -235,7 +237,7 @@ class _Trainer:
         self.optimizer.zero_grad(set_to_none=True)
         smoothing = self.config.recipe.label_smoothing
         with self.fabric.autocast():
-            loss, _ = self.network.training_loss(batch.points, batch.labels, smoothing, batch.neighbourhoods)
+            loss, _ = self.training_loss(batch.points, batch.labels, smoothing, batch.neighbourhoods)
         loss.backward()  # type: ignore[no-untyped-call]
         if self.config.recipe.gradient_clip is not None:
             torch.nn.utils.clip_grad_norm_(self.network.parameters(), self.config.recipe.gradient_clip)

@@ -47,6 +47,7 @@ class Recipe(BaseModel):
     augmentation: Augmentation = Augmentation()
     coarse_to_fine: tuple[Stage, ...] = ()  # what the shares leave is trained on all points
     precision: Literal["auto", "fp32", "bf16"] = "auto"
+    compile: bool = False  # torch.compile; docs/speed.md has what it brings
 
 
 # Yaw stays near the true heading: the frame is the sensor's and its x axis is where the robot looks. Nothing moves
