@@ -23,8 +23,6 @@ GROUPS: dict[str, tuple[str, ...]] = {
     "optimiser": ("Optimizer", "_foreach", "_fused_adam", "addcdiv", "lerp", "aten::sqrt"),
     "matrix products": ("mm", "matmul", "linear", "conv", "einsum", "mkldnn", "onednn", "aten::dot"),
     "batch norm": ("batch_norm", "BatchNorm", "aten::var", "rsqrt", "Moment"),
-    "neighbour search": ("topk", "cdist", "sort", "kthvalue", "aten::lt", "aten::le", "nonzero", "bitwise"),
-    "gathers and scatters": ("index", "gather", "scatter", "embedding", "Neighbour", "Gather"),
     "activations": (
         "relu",
         "elu",
@@ -36,6 +34,8 @@ GROUPS: dict[str, tuple[str, ...]] = {
         "bernoulli",
         "nll_loss",
     ),
+    "neighbour search": ("topk", "cdist", "sort", "kthvalue", "aten::lt", "aten::le", "nonzero", "bitwise"),
+    "gathers and scatters": ("index", "gather", "scatter", "embedding", "Neighbour", "Gather"),
     "pooling": ("max", "amin", "aten::mean", "MeanBackward", "Max", "Winner"),
     "copies": ("copy", "clone", "contiguous", "aten::cat", "stack", "zero", "fill", "empty", "aten::to"),
     "arithmetic": (
