@@ -172,6 +172,27 @@ def knn(out: Out, points: Points = _ALL_POINTS, repeats: Repeats = 5, threads: T
 
 
 @app.command()
+def thinning(
+    out: Out,
+    data: Annotated[Path, typer.Option(help="A prepared data set, simulated.")],
+    network: Annotated[str, typer.Option(help="Whose packaged weights.")] = "pointnet2",
+    count: Annotated[int, typer.Option(help="Test clouds, drawn at random.", min=1)] = 300,
+    fold: Annotated[int, typer.Option(help="Of protocol paper.", min=0, max=4)] = 0,
+) -> None:
+    """Whether sampling some pixels, as a robot does, gives the answers of sampling all, as in training."""
+    from benchmarks.store import write_once
+    from benchmarks.thinning import measure, thinning_table
+    from doorstate.console import progress_bar
+    from doorstate.dataset.store import open_dataset
+
+    with progress_bar("thinning") as progress:
+        rows = measure(open_dataset(data), network, count, fold, progress)
+    table = thinning_table(rows)
+    write_once(out, "thinning", _settings(network=network, fold=fold, data=str(data)), rows, table)
+    _tell(table, out / "thinning.md")
+
+
+@app.command()
 def curves(
     out: Out,
     data: Annotated[Path, typer.Option(help="A prepared data set.")],

@@ -251,3 +251,15 @@ def test_both_forms_train_alike(small_dataset: PreparedDataset, tmp_path: Path) 
     assert "| test |" in markdown
     assert (tmp_path / "curves" / "curves-pointnet2.png").read_bytes().startswith(b"\x89PNG")
     assert "fast and plain: pointnet2" in output
+
+
+def test_thinning_compares_answers(small_dataset: PreparedDataset, tmp_path: Path) -> None:
+    code, output, errors = run("thinning", "--data", small_dataset.folder, "--count", 3, "--out", tmp_path)
+    assert (code, errors) == (0, "")
+    _, rows, markdown = stored(tmp_path, "thinning")
+    assert len(rows) == 3
+    assert all(
+        sum(row[k]["probabilities"].values()) == pytest.approx(1) for row in rows for k in ("some", "all")
+    )
+    assert "| 3 |" in markdown
+    assert "Sampling from some pixels" in output

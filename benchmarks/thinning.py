@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Whether a robot's quick sampling of some pixels gives the answers of sampling them all, as in training."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from benchmarks.store import Group
+from doorstate.dataset.splits import draw_splits
+from doorstate.dataset.store import PreparedDataset
+from doorstate.deployment.predictor import Prediction, Predictor
+from doorstate.evaluation.table import Table, number
+from doorstate.jobs import Progress
+from doorstate.simulation.generate import replay
+from doorstate.simulation.manifest import unflatten
+
+
+def measure(dataset: PreparedDataset, network: str, count: int, fold: int, progress: Progress) -> list[Group]:
+    """Answers of packaged weights on test clouds of a fold, rendered anew, with both samplings."""
+    roles = draw_splits(dataset.rows, "paper", 0)[fold]
+    tested = [row for row in dataset.rows if roles[row["sample_id"]] == "test"]
+    chosen = np.random.default_rng(0).permutation(len(tested))[:count]
+    samplings = {"some": Predictor.load(network), "all": Predictor.load(network, thin=False)}
+    rows = []
+    for done, index in enumerate(chosen):
+        progress(done, len(chosen))
+        raw = replay(unflatten(tested[index])).points
+        answers = {name: predict(raw) for name, predict in samplings.items()}
+        rows.append({"sample_id": tested[index]["sample_id"]} | {k: _told(v) for k, v in answers.items()})
+    progress(len(chosen), len(chosen))
+    return rows
+
+
+def thinning_table(rows: Sequence[Group]) -> Table:
+    """One line: how many answers agree, how many of each are right, how far probabilities are apart."""
+    some, every = ([row[name] for row in rows] for name in ("some", "all"))
+    truth = [row["sample_id"].rsplit("-", 1)[-1] for row in rows]
+    agree = sum(a["state"] == b["state"] for a, b in zip(some, every, strict=True))
+    right = [sum(a["state"] == t for a, t in zip(answers, truth, strict=True)) for answers in (some, every)]
+    apart = [
+        max(abs(a["probabilities"][s] - b["probabilities"][s]) for s in a["probabilities"])
+        for a, b in zip(some, every, strict=True)
+    ]
+    return Table(
+        "Sampling from some pixels and from all",
+        ("clouds", "same answer", "right, some", "right, all", "median difference", "largest difference"),
+        (
+            (
+                str(len(rows)),
+                str(agree),
+                *map(str, right),
+                number(float(np.median(apart))),
+                number(max(apart)),
+            ),
+        ),
+        "Packaged weights on test clouds of their fold; differences are of the largest-differing probability.",
+    )
+
+
+def _told(answer: Prediction) -> Group:
+    return {"state": answer.state.label, "probabilities": answer.probabilities}
