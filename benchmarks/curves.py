@@ -80,17 +80,15 @@ def curves_table(rows: list[Group]) -> Table:
                 for key, digits in (("train_loss", 4), ("val_macro_f1", 4))
                 for line in (a, b)
             ),
-            *(number(line["seconds"], 0) for line in (a, b)),
         )
         for a, b in zip(fast, plain, strict=True)
     ]
     tested = [number(row["metrics"]["test_macro_f1"], 4) for row in rows]
-    total = [number(row["metrics"]["seconds"], 0) for row in rows]
     return Table(
         f"The same training, fast and plain: {rows[0]['metrics']['network']}",
-        ("epoch", "loss, fast", "loss, plain", "val F1, fast", "val F1, plain", "s, fast", "s, plain"),
-        (*lines, ("test", "", "", *tested, *total)),
-        "Same seed, batches and dropout; training loss, macro-F1 and seconds of each epoch, then of the test fold.",
+        ("epoch", "loss, fast", "loss, plain", "val F1, fast", "val F1, plain"),
+        (*lines, ("test", "", "", *tested)),
+        "Same seed, batches and dropout; training loss and macro-F1 of each epoch, then of the test fold.",
     )
 
 
