@@ -127,9 +127,10 @@ class _LinearMax(torch.autograd.Function):
         weight_grad = torch.einsum("gc,gcd->cd", grad, picked)
         if not ctx.needs_input_grad[0]:
             return None, weight_grad
-        spread = torch.zeros_like(flat)
-        spread.index_add_(0, places, (grad.unsqueeze(-1) * weight).flatten(0, 1))
-        return spread.view_as(rows), weight_grad
+        # Some points win many channels: their sum needs more digits than bfloat16 has.
+        spread = torch.zeros_like(flat, dtype=torch.promote_types(flat.dtype, torch.float32))
+        spread.index_add_(0, places, (grad.unsqueeze(-1).to(spread.dtype) * weight).flatten(0, 1))
+        return spread.to(rows.dtype).view_as(rows), weight_grad
 
 
 class _LinearReLU(torch.autograd.Function):
@@ -232,10 +233,10 @@ class _WithMoments(torch.autograd.Function):
     def backward(ctx: Any, grad: Tensor, mean_grad: Tensor, covariance_grad: Tensor) -> Tensor:
         rows, mean = ctx.saved_tensors
         slope = (covariance_grad + covariance_grad.T) / len(rows)
-        constant = (mean_grad / len(rows) - mean @ slope).to(grad.dtype)
-        slope = slope.to(grad.dtype)
+        rounded = slope.to(grad.dtype)
+        constant = (mean_grad / len(rows) - mean @ rounded.to(slope.dtype)).to(grad.dtype)  # cancels what is added
         for piece in pieces(len(rows), 2 * rows.shape[1]):
-            grad[piece].addmm_(rows[piece], slope).add_(constant)
+            grad[piece].add_(torch.addmm(constant, rows[piece], rounded))
         return grad
 
 

@@ -62,7 +62,11 @@ class RowBatchNorm(nn.BatchNorm1d):
         return out.view(rows.shape)
 
     def fold(
-        self, linear: nn.Linear, moments: tuple[Tensor, Tensor] | None = None, count: int = 0
+        self,
+        linear: nn.Linear,
+        moments: tuple[Tensor, Tensor] | None = None,
+        count: int = 0,
+        kind: torch.dtype | None = None,
     ) -> tuple[Tensor, Tensor]:
         """Weight and bias of one linear layer that equals `linear` followed by this normalisation.
 
@@ -73,6 +77,8 @@ class RowBatchNorm(nn.BatchNorm1d):
             linear: the layer before.
             moments: (C,) mean and (C, C) covariance of the batch's inputs; None takes the running statistics.
             count: number of inputs the moments are of.
+            kind: type the weight will be rounded to; the outputs' mean is then taken of rounded weights, so that it
+                still cancels, however far from zero the inputs are.
 
         Returns:
             (C', C) and (C',), at least float32.
@@ -80,13 +86,16 @@ class RowBatchNorm(nn.BatchNorm1d):
         weight = linear.weight
         bias = torch.zeros_like(self.bias) if linear.bias is None else linear.bias
         with full_precision(weight):
-            mean, variance = self.running_mean, self.running_var
-            if moments is not None:
-                mean = weight @ moments[0] + bias
-                variance = ((weight @ moments[1]) * weight).sum(1).clamp_min(0)
-                self._follow(mean, variance, count)
-            scale = self.weight * torch.rsqrt(variance + self.eps)
-            return weight * scale.unsqueeze(1), self.bias + scale * (bias - mean)
+            if moments is None:
+                scale = self.weight * torch.rsqrt(self.running_var + self.eps)
+                return weight * scale.unsqueeze(1), self.bias + scale * (bias - self.running_mean)
+            variance = ((weight @ moments[1]) * weight).sum(1).clamp_min(0)
+            self._follow(weight @ moments[0] + bias, variance, count)
+            scaled = weight * (self.weight * torch.rsqrt(variance + self.eps)).unsqueeze(1)
+            scaled = scaled if kind is None else scaled.to(kind).to(scaled.dtype)
+            return scaled, self.bias - scaled @ moments[
+                0
+            ] + 0 * bias  # the bias cancels, its gradient is zero
 
     @torch.no_grad()
     def _follow(self, mean: Tensor, variance: Tensor, count: int) -> None:
@@ -226,7 +235,7 @@ class DenseMax(nn.Module):
             return self.norm.max_after(self.linear, groups).view(shape)
         groups = groups.to(autocast_type(groups))
         flat, *moments = with_moments(groups.flatten(0, 1))
-        folded = self.norm.fold(self.linear, (moments[0], moments[1]), count=len(flat))
+        folded = self.norm.fold(self.linear, (moments[0], moments[1]), count=len(flat), kind=groups.dtype)
         return linear_max(flat.view_as(groups), *folded).view(shape)
 
 
