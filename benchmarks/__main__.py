@@ -200,7 +200,8 @@ def curves(
     points: Annotated[int, typer.Option(help="Points per cloud.", min=128)] = 512,
     epochs: Annotated[int, typer.Option(help="Length of both trainings.", min=1)] = 8,
     fold: Annotated[int, typer.Option(help="Of protocol paper.", min=0, max=4)] = 0,
-    runs: Annotated[Path, typer.Option(help="Folder of the two runs, which are resumable.")] = Path("runs"),
+    seeds: Annotated[int, typer.Option(help="How many seeds fast is trained from.", min=1)] = 3,
+    runs: Annotated[Path, typer.Option(help="Folder of the runs, which are resumable.")] = Path("runs"),
 ) -> None:
     """Train one fold with fast and with plain layers from the same seed.
 
@@ -227,7 +228,7 @@ def curves(
         seed=0,
         recipe=recipe,
     )
-    rows = train_both(config, dataset, draw_splits(dataset.rows, "paper", 0)[fold], runs / "curves")
+    rows = train_both(config, dataset, draw_splits(dataset.rows, "paper", 0)[fold], runs / "curves", seeds)
     table, title = curves_table(rows), f"curves-{name}"
     write_once(out, title, _settings(points=points, epochs=epochs, fold=fold, data=str(data)), rows, table)
     draw_curves(rows, out, title)

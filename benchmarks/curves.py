@@ -23,26 +23,27 @@ from doorstate.training import fit as training
 from doorstate.training.fit import RunConfig, fit
 from doorstate.training.run_folder import RunFolder
 
-FORMS = ("fast", "plain")
 _COLORS = {"fast": "#0072B2", "plain": "#D55E00"}
 
 
 def train_both(
-    config: RunConfig, dataset: PreparedDataset, roles: dict[str, Role], folder: Path
+    config: RunConfig, dataset: PreparedDataset, roles: dict[str, Role], folder: Path, seeds: int
 ) -> list[Group]:
-    """Train one fold in both forms; a form that a folder holds already is not trained again.
+    """Train one fold in both forms; a run that the folder holds already is not trained again.
 
     Returns:
-        One row per form: its log by epoch and its metrics.
+        One row per run, its log by epoch and its metrics: both forms from seed 0, then fast from other seeds, which
+        shows how far runs lie apart that differ in nothing but chance.
     """
     rows = []
-    for form in FORMS:
-        run = folder / f"{config.network}-{form}"
+    for form, seed in [("fast", 0), ("plain", 0), *(("fast", seed) for seed in range(1, seeds))]:
+        config = config.model_copy(update={"seed": seed})
+        run = folder / f"{config.network}-{form}-{seed}"
         build = training._build if form == "fast" else _build_plain
         with patch.object(training, "_build", build):
             metrics = fit(config, dataset, roles, run)
         log = [{key: float(value) for key, value in line.items()} for line in read_csv(RunFolder(run).log)]
-        rows.append({"form": form, "metrics": metrics, "log": log})
+        rows.append({"form": form, "seed": seed, "metrics": metrics, "log": log})
     return rows
 
 
@@ -71,24 +72,23 @@ def _build_plain(config: RunConfig) -> PointNetwork:
 
 def curves_table(rows: list[Group]) -> Table:
     """One line per epoch, and the test fold last."""
-    fast, plain = (row["log"] for row in rows)
+    epochs = zip(*(row["log"] for row in rows), strict=True)
     lines = [
         (
-            str(int(a["epoch"]) + 1),
-            *(
-                number(line[key], digits)
-                for key, digits in (("train_loss", 4), ("val_macro_f1", 4))
-                for line in (a, b)
-            ),
+            str(epoch + 1),
+            *(number(line["train_loss"], 3) for line in lines),
+            *(number(line["val_macro_f1"], 3) for line in lines),
         )
-        for a, b in zip(fast, plain, strict=True)
+        for epoch, lines in enumerate(epochs)
     ]
-    tested = [number(row["metrics"]["test_macro_f1"], 4) for row in rows]
+    names = [f"{row['form']}, seed {row['seed']}" for row in rows]
+    tested = [number(row["metrics"]["test_macro_f1"], 3) for row in rows]
     return Table(
         f"The same training, fast and plain: {rows[0]['metrics']['network']}",
-        ("epoch", "loss, fast", "loss, plain", "val F1, fast", "val F1, plain"),
-        (*lines, ("test", "", "", *tested)),
-        "Same seed, batches and dropout; training loss and macro-F1 of each epoch, then of the test fold.",
+        ("epoch", *(f"loss, {name}" for name in names), *(f"F1, {name}" for name in names)),
+        (*lines, ("test", *("" for _ in rows), *tested)),
+        "Training loss and validation macro-F1 of each epoch, then macro-F1 of the test fold. Runs of one seed have "
+        "the same first weights, batches and dropout; fast runs of other seeds show what is chance.",
     )
 
 
@@ -103,13 +103,13 @@ def draw_curves(rows: list[Group], folder: Path, name: str) -> None:
     ):
         for row in rows:
             epochs = [line["epoch"] + 1 for line in row["log"]]
-            style = "-" if row["form"] == "fast" else "--"
+            first = row["seed"] == 0
             axis.plot(
                 epochs,
                 [line[key] for line in row["log"]],
-                style,
                 color=_COLORS[row["form"]],
-                label=row["form"],
+                linewidth=2.0 if first else 0.8,
+                label=row["form"] if first else "_",
             )
         axis.set(title=title, xlabel="epoch")
         axis.legend(frameon=False)
