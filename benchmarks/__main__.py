@@ -118,15 +118,13 @@ def latency(
 ) -> None:
     """From a raw 640 x 480 cloud in memory to a state, stage by stage."""
     from benchmarks.latency import latency_table, measure
-    from benchmarks.store import write_once
     from doorstate.console import progress_bar
 
     names, counts = _names(networks), _counts(points)
     with progress_bar("latency") as progress:
         rows = measure(names, counts, _integers("--threads", threads, 1), repeats, progress)
     table = latency_table(rows)
-    write_once(out, "latency", _settings(threads=threads, repeats=repeats), rows, table)
-    _tell(table, out / "latency.md")
+    _finish(out, "latency", rows, table, threads=threads, repeats=repeats)
 
 
 @app.command()
@@ -141,7 +139,6 @@ def profile(
     """Where the time of a training step and of an inference goes, by groups of operators."""
     from benchmarks.clouds import simulated_clouds
     from benchmarks.profiling import measure, profile_table, profiled_forms
-    from benchmarks.store import write_once
     from doorstate.console import progress_bar
 
     if form not in ("plain", "fast", "both"):
@@ -151,8 +148,7 @@ def profile(
     with progress_bar("profile") as progress:
         rows = measure(names, profiled_forms(form), clouds, batch, threads, progress)
     table = profile_table(rows, batch)
-    write_once(out, "profile", _settings(points=points, batch=batch, threads=threads), rows, table)
-    _tell(table, out / "profile.md")
+    _finish(out, "profile", rows, table, points=points, batch=batch, threads=threads)
 
 
 @app.command()
@@ -160,15 +156,13 @@ def knn(out: Out, points: Points = _ALL_POINTS, repeats: Repeats = 5, threads: T
     """Nearest neighbours in the feature space of DGCNN."""
     from benchmarks.clouds import simulated_clouds
     from benchmarks.neighbours import knn_table, measure
-    from benchmarks.store import write_once
     from doorstate.console import progress_bar
 
     counts = _counts(points)
     with progress_bar("knn") as progress:
         rows = measure(simulated_clouds(1, max(counts)), counts, repeats, threads, progress)
     table = knn_table(rows)
-    write_once(out, "knn", _settings(threads=threads, repeats=repeats), rows, table)
-    _tell(table, out / "knn.md")
+    _finish(out, "knn", rows, table, threads=threads, repeats=repeats)
 
 
 @app.command()
@@ -180,7 +174,6 @@ def thinning(
     fold: Annotated[int, typer.Option(help="Of protocol paper.", min=0, max=4)] = 0,
 ) -> None:
     """Whether sampling some pixels, as a robot does, gives the answers of sampling all, as in training."""
-    from benchmarks.store import write_once
     from benchmarks.thinning import measure, thinning_table
     from doorstate.console import progress_bar
     from doorstate.dataset.store import open_dataset
@@ -188,8 +181,7 @@ def thinning(
     with progress_bar("thinning") as progress:
         rows = measure(open_dataset(data), network, count, fold, progress)
     table = thinning_table(rows)
-    write_once(out, "thinning", _settings(network=network, fold=fold, data=str(data)), rows, table)
-    _tell(table, out / "thinning.md")
+    _finish(out, "thinning", rows, table, network=network, fold=fold, data=str(data))
 
 
 @app.command()
@@ -210,7 +202,6 @@ def curves(
       python -m benchmarks curves --data data/ogurob-4096 --network dgcnn --points 256 --epochs 4 --out reports/speed
     """
     from benchmarks.curves import curves_table, draw_curves, train_both
-    from benchmarks.store import write_once
     from doorstate.dataset.splits import draw_splits
     from doorstate.dataset.store import open_dataset
     from doorstate.training.fit import RunConfig
@@ -230,9 +221,8 @@ def curves(
     )
     rows = train_both(config, dataset, draw_splits(dataset.rows, "paper", 0)[fold], runs / "curves", seeds)
     table, title = curves_table(rows), f"curves-{name}"
-    write_once(out, title, _settings(points=points, epochs=epochs, fold=fold, data=str(data)), rows, table)
     draw_curves(rows, out, title)
-    _tell(table, out / f"{title}.md")
+    _finish(out, title, rows, table, points=points, epochs=epochs, fold=fold, data=str(data))
 
 
 def main() -> None:
@@ -270,6 +260,14 @@ def _settings(**options: Any) -> dict[str, Any]:
     from doorstate.training.environment import describe_environment
 
     return describe_environment() | options
+
+
+def _finish(out: Path, name: str, rows: list[dict[str, Any]], table: Table, **options: Any) -> None:
+    """Store and show what was measured in one go."""
+    from benchmarks.store import write_once
+
+    write_once(out, name, _settings(**options), rows, table)
+    _tell(table, out / f"{name}.md")
 
 
 def _tell(table: Table, path: Path, remarks: Sequence[str] = ()) -> None:

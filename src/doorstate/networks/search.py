@@ -35,8 +35,10 @@ def spatial_order(points: Tensor) -> Tensor:
     """
     batch, num_points, dimensions = points.shape
     order = torch.arange(num_points, device=points.device).expand(batch, -1)
-    size = 0 if torch.compiler.is_exporting() else num_points
-    while size and size % 2 == 0 and size not in _BLOCK_SIZES:
+    if torch.compiler.is_exporting():
+        return order
+    size, smallest = num_points, _block_size(num_points)
+    while size > smallest:
         cells = points.reshape(-1, size, dimensions)
         widest = (cells.amax(1) - cells.amin(1)).argmax(-1).view(-1, 1, 1)
         along = cells.gather(2, widest.expand(-1, size, 1)).squeeze(2).argsort(dim=1)  # (cells, size)
@@ -64,9 +66,9 @@ def knn(query: Tensor, points: Tensor, k: int, *, in_order: bool = False) -> Ten
     """
     k = min(k, points.shape[1])
     with full_precision(points):
-        query, points = query.detach(), points.detach()
+        query, points = at_least_float32(query.detach()), at_least_float32(points.detach())
         if not _blocks_pay(query, points, k):
-            return _nearest_of_all(at_least_float32(query), at_least_float32(points), k)
+            return _nearest_of_all(query, points, k)
         names = torch.arange(points.shape[1], device=points.device).expand(len(points), -1)
         if in_order:
             return _nearest_in_blocks(query, points, names, k)
@@ -132,8 +134,13 @@ def _first_hits_of_all(centres: Tensor, points: Tensor, radius: float, num_sampl
 
 
 def _nearest_of_all(query: Tensor, points: Tensor, k: int) -> Tensor:
+    """Nearest neighbours by all distances: of coordinates by exact differences, of features by a matrix product."""
+    find_distances = _coordinate_distances if points.shape[2] == 3 else _feature_distances
+    block_size = max(1, _DISTANCES_PER_BLOCK // points.shape[1])
     found = []
-    for start, block, distances in _distance_blocks(query, points):
+    for start in range(0, query.shape[1], block_size):
+        block = query[:, start : start + block_size]
+        distances = find_distances(block, points)  # (B, m, N)
         same_index = torch.arange(start, start + block.shape[1], device=points.device)  # (m,)
         same = (block == points[:, start : start + block.shape[1]]).all(-1, keepdim=True)  # (B, m, 1)
         column = same_index.view(1, -1, 1).expand_as(same)
@@ -241,19 +248,6 @@ def _chunks(order: Tensor, count: Tensor, pairs: int) -> Iterator[tuple[Tensor, 
         start = max(0, stop - max(1, _DISTANCES_PER_BLOCK // (width * pairs)))
         yield order[start:stop], width
         stop = start
-
-
-def _distance_blocks(query: Tensor, points: Tensor) -> Iterator[tuple[int, Tensor, Tensor]]:
-    """Runs of queries: index of the first, (B, m, D) queries, (B, m, N) squared distances to all points.
-
-    Of coordinates by exact differences; of feature vectors by a matrix product.
-    """
-    query, points = at_least_float32(query.detach()), at_least_float32(points.detach())
-    block_size = max(1, _DISTANCES_PER_BLOCK // points.shape[1])
-    distances = _coordinate_distances if points.shape[2] == 3 else _feature_distances
-    for start in range(0, query.shape[1], block_size):
-        block = query[:, start : start + block_size]
-        yield start, block, distances(block, points)
 
 
 def _coordinate_distances(query: Tensor, points: Tensor) -> Tensor:
