@@ -11,27 +11,31 @@ from rich.console import Console
 
 from doorstate import console
 from doorstate.training.comparison import Run
+from doorstate.training.recipes import Recipe, Stage
 from doorstate.training.run_folder import RunFolder
 
-EPOCHS = {"pointnet": 10, "dgcnn": 10}
+RECIPE = Recipe(name="x", epochs=10, coarse_to_fine=(Stage(share=0.5, points=256),))
+RECIPES = {"pointnet": RECIPE, "dgcnn": RECIPE}
 
 
 def begun(folder: Path) -> RunFolder:
     run = RunFolder(folder)
-    run.write_log([{"epoch": 0, "seconds": 60.0}, {"epoch": 1, "seconds": 30.0}])
+    run.write_log([{"epoch": n, "points": 256, "centres": 1, "seconds": 30.0} for n in range(2)])
     run.write_position(2.5)
     return run
 
 
 def finished(folder: Path) -> RunFolder:
     run = RunFolder(folder)
+    points = [256] * 5 + [512] * 5
+    run.write_log([{"epoch": n, "points": p, "centres": 1, "seconds": p / 16} for n, p in enumerate(points)])
     run.finish({"test_macro_f1": 0.98765, "seconds": 600.0})
     return run
 
 
 def shown(runs: list[Run], jobs: int) -> str:
     screen = Console(file=io.StringIO(), width=100)
-    screen.print(console._RunWatch(runs, EPOCHS, jobs).table())
+    screen.print(console._RunWatch(runs, RECIPES, 512, jobs).table())
     assert isinstance(screen.file, io.StringIO)
     return screen.file.getvalue()
 
@@ -46,8 +50,8 @@ def test_the_live_table_says_what_is_done_and_how_long_the_rest_takes(tmp_path: 
     text = shown(runs, jobs=1)
     assert "0.9877" in text
     assert "2.5 / 10" in text
-    # PointNet: 10 epochs of 60 s; DGCNN: 7.5 and 10 of 30 s.
-    assert "about 19 min left" in text
+    # PointNet: 5 epochs of 16 s and 5 of 32 s. DGCNN: 2.5 and 5 of 30 s, then 5 and 5 that nobody has seen, of 60 s.
+    assert "about 18 min left" in text
     assert "about 9 min left" in shown(runs, jobs=2)
 
 
@@ -59,9 +63,18 @@ def test_without_a_finished_epoch_nothing_is_promised(tmp_path: Path) -> None:
 def test_where_nobody_looks_finished_runs_are_counted(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    with console.live_runs([Run("dgcnn", 0, RunFolder(tmp_path))], EPOCHS, 1) as progress:
+    with console.live_runs([Run("dgcnn", 0, RunFolder(tmp_path))], RECIPES, 512, 1) as progress:
         progress(1, 4)
     assert capsys.readouterr().err == "1 of 4 runs finished\n"
+    with console.live_runs([Run("dgcnn", 0, begun(tmp_path))], RECIPES, 512, 1) as progress:
+        progress(1, 4)
+    assert capsys.readouterr().err == "1 of 4 runs finished, about 6 min left\n"
+
+
+def test_a_run_that_tested_nothing_is_done(tmp_path: Path) -> None:
+    run = RunFolder(tmp_path)
+    run.finish({"seconds": 1.0})
+    assert "done" in shown([Run("pointnet", 0, run)], jobs=1)
 
 
 def test_bars_print_nothing_where_nobody_looks(capsys: pytest.CaptureFixture[str]) -> None:

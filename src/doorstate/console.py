@@ -22,6 +22,7 @@ from rich.table import Table
 
 if TYPE_CHECKING:
     from doorstate.training.comparison import Run
+    from doorstate.training.recipes import Recipe
 
 out = Console(highlight=False)
 err = Console(stderr=True, highlight=False)
@@ -64,32 +65,34 @@ def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]
 
 @contextmanager
 def live_runs(
-    runs: Sequence[Run], epochs: Mapping[str, int], jobs: int
+    runs: Sequence[Run], recipes: Mapping[str, Recipe], num_points: int, jobs: int
 ) -> Iterator[Callable[[int, int], None]]:
     """Show how far every run is, read from the run folders once a second; yields `update(done, total)`.
 
     Where nobody looks, finished runs are counted in plain lines instead.
     """
+    watch = _RunWatch(runs, recipes, num_points, jobs)
     if not err.is_terminal:
 
         def say(done: int, total: int) -> None:
-            err.print(f"{done} of {total} runs finished")
+            err.print(f"{done} of {total} runs finished{watch.time_left()}", soft_wrap=True)
 
         yield say
         return
-    watch = _RunWatch(runs, epochs, jobs)
     with Live(get_renderable=watch.table, console=err, refresh_per_second=1):
         yield lambda done, total: None
 
 
 class _RunWatch:
-    def __init__(self, runs: Sequence[Run], epochs: Mapping[str, int], jobs: int) -> None:
-        self._runs, self._epochs, self._jobs = runs, epochs, jobs
+    def __init__(
+        self, runs: Sequence[Run], recipes: Mapping[str, Recipe], num_points: int, jobs: int
+    ) -> None:
+        self._runs, self._recipes, self._num_points, self._jobs = runs, recipes, num_points, jobs
 
     def table(self) -> Table:
         folds = sorted({run.fold for run in self._runs})
         table = Table(
-            title=f"macro-F1 on the test fold, or epochs done{self._time_left()}", title_justify="left"
+            title=f"macro-F1 on the test fold, or epochs done{self.time_left()}", title_justify="left"
         )
         table.add_column("network")
         for fold in folds:
@@ -99,28 +102,18 @@ class _RunWatch:
             table.add_row(network, *cells)
         return table
 
+    def time_left(self) -> str:
+        """How long the rest will take, once that can be said."""
+        from doorstate.training.remaining import seconds_left
+
+        seconds = seconds_left(self._runs, self._recipes, self._num_points)
+        return f", about {seconds / self._jobs / 60:.0f} min left" if seconds else ""
+
     def _cell(self, run: Run) -> str:
         if run.folder.finished:
-            return f"[green]{run.folder.read_metrics()['test_macro_f1']:.4f}[/green]"
+            score = run.folder.read_metrics().get("test_macro_f1")
+            return "[green]done[/green]" if score is None else f"[green]{score:.4f}[/green]"
         position = run.folder.read_position()
         if not position:
             return "[dim]-[/dim]"
-        return f"{position:.1f} / {self._epochs[run.network]}"
-
-    def _time_left(self) -> str:
-        """Seconds of one epoch, as far as known, times the epochs that are left."""
-        seconds: dict[str, float] = {}
-        for run in self._runs:
-            if run.folder.finished:
-                seconds[run.network] = run.folder.read_metrics()["seconds"] / self._epochs[run.network]
-            elif run.network not in seconds and run.folder.log.is_file():
-                seconds[run.network] = run.folder.last_epoch_seconds()
-        if not seconds:
-            return ""
-        known = sum(seconds.values()) / len(seconds)
-        left = sum(
-            seconds.get(run.network, known) * (self._epochs[run.network] - run.folder.read_position())
-            for run in self._runs
-            if not run.folder.finished
-        )
-        return f", about {left / self._jobs / 60:.0f} min left"
+        return f"{position:.1f} / {self._recipes[run.network].epochs}"

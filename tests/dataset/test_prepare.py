@@ -14,7 +14,7 @@ from doorstate.clouds.pcd import write_pcd
 from doorstate.clouds.preparation import prepare_cloud
 from doorstate.dataset import prepare
 from doorstate.dataset.prepare import REJECTED, prepare_dataset
-from doorstate.dataset.store import CLOUDS, DESCRIPTION, MANIFEST, PARTS
+from doorstate.dataset.store import CLOUDS, DESCRIPTION, MANIFEST, PARTS, open_dataset
 from doorstate.dataset.strata import distance_band, region
 from doorstate.errors import ConfigError, DatasetError
 from doorstate.simulation.generate import replay
@@ -39,6 +39,22 @@ def undisturbed(tiny_simulation: Path, tmp_path_factory: pytest.TempPathFactory)
 
 def contents(folder: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+def test_a_data_set_without_clouds_makes_the_same_ones_from_its_rows(
+    undisturbed: Path, tmp_path: Path
+) -> None:
+    stored = open_dataset(undisturbed)
+    shutil.copy(undisturbed / MANIFEST, tmp_path)
+    stored.description.model_copy(update={"clouds": "replayed"}).save(tmp_path)
+    rows = open_dataset(tmp_path)
+    np.testing.assert_array_equal(rows.cloud(4, 20), stored.cloud(4)[:20])
+    np.testing.assert_array_equal(rows.cloud(4), stored.cloud(4))
+    np.testing.assert_array_equal(rows.parts(4, 30), stored.parts(4, 30))
+    with pytest.raises(DatasetError, match="rows without clouds"):
+        _ = rows.clouds
+    (raw,) = rows.raw_clouds(1)
+    np.testing.assert_array_equal(raw, replay(unflatten(rows.rows[0])).points)
 
 
 def test_clouds_and_parts_are_those_of_the_replayed_rows(tiny_simulation: Path, tmp_path: Path) -> None:

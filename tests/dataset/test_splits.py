@@ -130,6 +130,12 @@ def test_a_seed_draws_the_same_and_another_seed_another(protocol: str) -> None:
     assert draw_splits(ALL, protocol, 1) != draw_splits(ALL, protocol, 2)
 
 
+def test_all_trains_on_everything() -> None:
+    (roles,) = draw_splits(ALL, "all", 0)
+    assert set(roles.values()) == {"train"}
+    assert len(roles) == len(ALL)
+
+
 def test_splits_come_back_from_their_file(tmp_path: Path) -> None:
     splits = draw_splits(rows_at(reduced_ring(60)), "by-pose", 0)
     assert "unused" in {role for roles in splits for role in roles.values()}

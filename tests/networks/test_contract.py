@@ -11,6 +11,8 @@ from doorstate.errors import CloudContentError, ConfigError
 from doorstate.networks import create_network, list_networks
 from doorstate.networks.base import PointNetwork
 from doorstate.networks.layers import RowBatchNorm
+from doorstate.networks.point2sequence import Point2Sequence
+from doorstate.networks.pointnet2 import PointNet2
 
 NAMES = ("pointnet", "pointnet2", "dgcnn", "pointcnn", "point2sequence")
 LABELS = torch.tensor([0, 2])
@@ -130,6 +132,21 @@ def test_autocast_changes_little_in_evaluation(network: PointNetwork) -> None:
             rounded = network.features(points).float()
             assert network(points).dtype == torch.float32
     assert (rounded - exact).norm() / exact.norm() < 0.05
+
+
+def test_fewer_centres_are_the_first_and_come_back(network: PointNetwork) -> None:
+    network.eval()
+    points = clouds(600)
+    with torch.no_grad():
+        whole = network.features(points)
+        network.use_centres(0.5)
+        half = network.features(points)
+        network.use_centres(1.0)
+        torch.testing.assert_close(network.features(points), whole)
+    has_centres = isinstance(network, PointNet2 | Point2Sequence)
+    assert torch.equal(half, whole) != has_centres
+    if isinstance(network, Point2Sequence):
+        assert (half <= whole).all(), "a maximum over fewer areas"
 
 
 def test_label_smoothing_is_spread_over_all_classes() -> None:

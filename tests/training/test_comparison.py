@@ -19,6 +19,7 @@ from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import ConfigError, RunError
 from doorstate.simulation.manifest import read_csv
 from doorstate.training.comparison import Experiment, compare, load_experiment, prepare_comparison, runs_of
+from doorstate.training.resolution import load_study
 
 CHANGES = {"epochs": 4, "batch_size": 8, "precision": "fp32"}
 
@@ -51,6 +52,18 @@ def test_options_win_over_the_file_and_the_file_over_defaults(tmp_path: Path) ->
     assert found.recipe_of("pointnet").epochs == 7
 
 
+def test_a_network_may_differ_and_options_win_over_that_too(tmp_path: Path) -> None:
+    path = write(
+        tmp_path / "mine.toml",
+        'dataset = "d"\n[recipe_changes]\nepochs = 5\n[network_changes.dgcnn]\nepochs = 3\nbatch_size = 4\n',
+    )
+    found = load_experiment(path, {})
+    assert [found.recipe_of(network).epochs for network in ("pointnet", "dgcnn")] == [5, 3]
+    found = load_experiment(path, {"recipe_changes": {"epochs": 7}})
+    assert [found.recipe_of(network).epochs for network in ("pointnet", "dgcnn")] == [7, 7]
+    assert found.recipe_of("dgcnn").batch_size == 4
+
+
 @pytest.mark.parametrize(
     ("text", "complaint"),
     [
@@ -60,6 +73,10 @@ def test_options_win_over_the_file_and_the_file_over_defaults(tmp_path: Path) ->
         ('dataset = "d"\nprotocol = "random"', "choose one of paper, by-pose"),
         ('dataset = "d"\nrecipe = "best"', "choose common or authors"),
         ('dataset = "d"\n[recipe_changes]\nepoch = 3', "recipe_changes: epoch: Extra inputs"),
+        ('dataset = "d"\nrecipe_changes = 3', "recipe_changes: Input should be a valid dictionary"),
+        ('dataset = "d"\n[network_changes.pointnett]\nepochs = 3', "no network 'pointnett'"),
+        ('dataset = "d"\n[network_changes.dgcnn]\nepoch = 3', "recipe_changes: epoch: Extra inputs"),
+        ('dataset = "d"\nprotocol = "all"', "protocol all has one fold: set folds = 1"),
         ('dataset = "d"\nfolds = 6', "folds: Input should be less than or equal to 5"),
     ],
 )
@@ -78,7 +95,33 @@ def test_a_missing_experiment_is_named(tmp_path: Path) -> None:
     "path", sorted(Path(__file__).parents[2].glob("experiments/*.toml")), ids=lambda p: p.name
 )
 def test_the_experiments_of_the_repository_are_valid(path: Path) -> None:
-    assert load_experiment(path, {}).name == path.stem
+    load = load_study if path.stem == "resolution" else lambda path: load_experiment(path, {})
+    assert load(path).name == path.stem
+
+
+def test_runs_go_on_from_the_weights_of_another_comparison(
+    small_dataset: PreparedDataset, tmp_path: Path
+) -> None:
+    first = experiment(small_dataset, folds=1, recipe_changes=CHANGES | {"epochs": 1})
+    compare(first, tmp_path / "first")
+    again = first.model_copy(
+        update={"start_from": str(tmp_path / "first"), "recipe_changes": CHANGES | {"epochs": 0}}
+    )
+    compare(again, tmp_path / "again")
+    one, other = outcome(tmp_path / "first"), outcome(tmp_path / "again")
+    name = "runs/pointnet2/fold0/predictions.csv"
+    assert one[name] == other[name]
+
+
+def test_training_on_everything_tests_nothing(small_dataset: PreparedDataset, tmp_path: Path) -> None:
+    everything = experiment(small_dataset, protocol="all", folds=1, recipe_changes=CHANGES | {"epochs": 2})
+    (metrics,) = compare(everything, tmp_path / "c")
+    assert metrics["train_samples"] == len(small_dataset)
+    assert metrics["best_epoch"] == 1, "the last"
+    assert "test_macro_f1" not in metrics
+    folder = tmp_path / "c" / "runs" / "pointnet2" / "fold0"
+    assert not (folder / "predictions.csv").exists()
+    assert (folder / "weights.safetensors").is_file()
 
 
 def test_the_split_is_drawn_once(small_dataset: PreparedDataset, tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from torch._dynamo.exc import TorchDynamoException
 from doorstate.clouds.augment import Augmentation
 from doorstate.dataset.splits import Role, draw_splits
 from doorstate.dataset.store import PreparedDataset
-from doorstate.errors import DatasetError, RunError
+from doorstate.errors import ConfigError, DatasetError, RunError, WeightsError
 from doorstate.networks.pointnet2 import PointNet2
 from doorstate.simulation.manifest import read_csv
 from doorstate.training import fit as fit_module
@@ -74,6 +74,7 @@ def test_a_run_leaves_everything_needed_to_judge_it(finished: Path, roles: dict[
         "log.csv",
         "metrics.json",
         "predictions.csv",
+        "validation.csv",
         "weights.safetensors",
     ]
     predictions = read_csv(finished / "predictions.csv")
@@ -148,6 +149,26 @@ def test_training_leaves_the_global_generator_alone(
     torch.manual_seed(5)
     fit(config(recipe=RECIPE.model_copy(update={"epochs": 1})), small_dataset, roles, tmp_path / "run")
     assert torch.equal(torch.rand(1), expected)
+
+
+def test_weights_to_start_from_must_fit(
+    finished: Path, small_dataset: PreparedDataset, roles: dict[str, Role], tmp_path: Path
+) -> None:
+    weights = str(finished / "weights.safetensors")
+    with pytest.raises(WeightsError, match="is for pointnet2 , not pointnet"):
+        fit(config(network="pointnet", start_from=weights), small_dataset, roles, tmp_path / "a")
+    with pytest.raises(WeightsError, match="no such weights file"):
+        fit(config(start_from="gone"), small_dataset, roles, tmp_path / "b")
+    with pytest.raises(ConfigError, match="0 epochs train nothing"):
+        fit(config(recipe=RECIPE.model_copy(update={"epochs": 0})), small_dataset, roles, tmp_path / "c")
+
+
+def test_validation_answers_are_kept_for_calibration(finished: Path, roles: dict[str, Role]) -> None:
+    rows = read_csv(finished / "validation.csv")
+    assert {row["sample_id"] for row in rows} == {name for name, role in roles.items() if role == "val"}
+    metrics = json.loads((finished / "metrics.json").read_text())
+    right = [row["state"] == row["predicted"] for row in rows]
+    assert metrics["val_accuracy"] == pytest.approx(sum(right) / len(right))
 
 
 def test_another_run_in_the_same_folder_is_refused(

@@ -20,7 +20,7 @@ from doorstate.training.recipes import (
     batchnorm_momentum,
     find_recipe,
     learning_rate,
-    points_of_epoch,
+    resolution_of_epoch,
 )
 
 PER_EPOCH = 100
@@ -96,15 +96,31 @@ def test_coarse_to_fine_ends_on_all_points() -> None:
     recipe = Recipe(
         name="x", epochs=10, coarse_to_fine=(Stage(share=0.3, points=256), Stage(share=0.4, points=1024))
     )
-    points = [points_of_epoch(recipe, epoch, 4096) for epoch in range(10)]
+    points = [resolution_of_epoch(recipe, epoch, 4096).points for epoch in range(10)]
     assert points == [256] * 3 + [1024] * 4 + [4096] * 3
-    assert points_of_epoch(recipe, 5, 512) == 512, "never more points than the run has"
+    assert resolution_of_epoch(recipe, 5, 512).points == 512, "never more points than the run has"
+
+
+def test_the_last_stage_has_all_centres() -> None:
+    recipe = Recipe(name="x", epochs=4, coarse_to_fine=(Stage(share=0.5, points=4096, centres=0.25),))
+    assert [resolution_of_epoch(recipe, epoch, 4096).centres for epoch in range(4)] == [0.25, 0.25, 1, 1]
+
+
+def test_a_fine_epoch_moves_the_rate_as_far_as_the_root_of_its_points() -> None:
+    # Four epochs of 256 points weigh as much as one of 4096: both halves take half of the cycle.
+    recipe = Recipe(
+        name="x", epochs=5, learning_rate=1.0, warmup=0.5, coarse_to_fine=(Stage(share=0.8, points=256),)
+    )
+    rates = [learning_rate(recipe, i, PER_EPOCH) for i in range(5 * PER_EPOCH)]
+    assert max(rates) == rates[4 * PER_EPOCH] == pytest.approx(1.0)
+    assert rates[4 * PER_EPOCH + 50] == pytest.approx(0.5, abs=1e-3)
+    assert rates[-1] < 1e-3
 
 
 def test_coarse_to_fine_must_leave_epochs_for_all_points() -> None:
     recipe = Recipe(name="x", epochs=10, coarse_to_fine=(Stage(share=1.0, points=256),))
     with pytest.raises(ConfigError, match="leave some for all points"):
-        points_of_epoch(recipe, 10, 4096)
+        resolution_of_epoch(recipe, 10, 4096)
 
 
 def test_an_unknown_field_is_refused() -> None:

@@ -16,7 +16,7 @@ def train(
     data: Annotated[Path, typer.Option(help="A prepared data set.")],
     out: Annotated[Path, typer.Option(help="Folder of the run; a begun run goes on.")],
     fold: Annotated[int, typer.Option(help="Which of the five folds is tested.", min=0, max=4)] = 0,
-    protocol: Annotated[str, typer.Option(help="paper or by-pose.")] = "paper",
+    protocol: Annotated[str, typer.Option(help="paper, by-pose or all, which tests nothing.")] = "paper",
     points: Annotated[int, typer.Option(help="Points of every cloud.", min=128)] = 4096,
     seed: Annotated[int, typer.Option(min=0)] = 0,
     recipe: Annotated[str, typer.Option(help="common or authors.")] = "common",
@@ -53,12 +53,15 @@ def train(
     if not splits.is_file():
         write_splits(splits, draw_splits(dataset.rows, protocol, seed))
     runs = [Run(network, fold, RunFolder(out))]
-    with live_runs(runs, {network: experiment.recipe_of(network).epochs}, 1):
+    with live_runs(runs, {network: experiment.recipe_of(network)}, points, 1):
         metrics = train_one(experiment, out, dataset, network, fold, splits)
-    stdout.print(
-        f"{network}, fold {fold}: test macro-F1 {metrics['test_macro_f1']:.4f}, accuracy {metrics['test_accuracy']:.4f}"
-        f" on {metrics['test_samples']} clouds; weights in {out / 'weights.safetensors'}"
-    )
+    tested = f"trained on all {metrics['train_samples']} clouds"
+    if metrics["test_samples"]:
+        tested = (
+            f"fold {fold}: test macro-F1 {metrics['test_macro_f1']:.4f}, accuracy {metrics['test_accuracy']:.4f}"
+            f" on {metrics['test_samples']} clouds"
+        )
+    stdout.print(f"{network}, {tested}; weights in {out / 'weights.safetensors'}", soft_wrap=True)
 
 
 def compare(
@@ -91,6 +94,8 @@ def compare(
       doorstate compare --data data/ogurob-4096 --protocol by-pose --networks pointnet,dgcnn --out runs/two
     """
     from doorstate.console import live_runs, print_table
+    from doorstate.console import out as stdout
+    from doorstate.dataset.splits import EVERYTHING
     from doorstate.training.comparison import compare as run_comparison
     from doorstate.training.comparison import load_experiment, runs_of
 
@@ -109,22 +114,26 @@ def compare(
     settings = load_experiment(experiment, overrides | {"recipe_changes": recipe_changes(changes, epochs)})
     folder = out or Path("runs") / settings.name
     runs = runs_of(settings, folder)
-    planned = {network: settings.recipe_of(network).epochs for network in settings.networks}
-    with live_runs(runs, planned, jobs) as progress:
+    recipes = {network: settings.recipe_of(network) for network in settings.networks}
+    with live_runs(runs, recipes, settings.num_points, jobs) as progress:
         metrics = run_comparison(settings, folder, jobs, progress)
+    if settings.protocol == EVERYTHING:
+        stdout.print(f"trained on all samples, tested on none: weights in {folder / 'runs'}", soft_wrap=True)
+        return
     print_table(
         f"{settings.name}: macro-F1 on the test folds (protocol {settings.protocol}, {settings.num_points} points)",
         ["network", *(f"fold {fold}" for fold in range(settings.folds)), "mean"],
         [_score_row(network, metrics) for network in settings.networks],
     )
-    from doorstate.console import out as stdout
-
-    stdout.print(f"next: doorstate report {folder}")
+    stdout.print(f"next: doorstate report {folder}", soft_wrap=True)
 
 
 def report(
     folder: Annotated[Path, typer.Argument(help="A comparison, or a prepared data set.")],
     out: Annotated[Path | None, typer.Option(help="Folder to write to; FOLDER/report if not given.")] = None,
+    data: Annotated[
+        Path | None, typer.Option(help="The comparison's data set, if it is not where it was.")
+    ] = None,
 ) -> None:
     """Write tables, figures and one self-contained HTML page; of a data set, Table 1 and Figures 1 and 2.
 
@@ -140,7 +149,7 @@ def report(
     target = out or folder / "report"
     with err.status("Writing the report"):
         if (folder / "comparison.json").is_file():
-            page = write_everything(folder, target)
+            page = write_everything(folder, target, data)
         else:
             page = write_dataset_figures(folder, target)
     stdout.print(f"report: {page}", soft_wrap=True)

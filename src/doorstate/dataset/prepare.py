@@ -14,8 +14,9 @@ import numpy as np
 
 from doorstate import __version__
 from doorstate.clouds.io import ReadOptions, read_cloud
-from doorstate.clouds.preparation import NUM_POINTS, prepare_cloud
+from doorstate.clouds.preparation import NUM_POINTS
 from doorstate.dataset.class_folders import labelled_rows
+from doorstate.dataset.sampled import exactly, sample_frame
 from doorstate.dataset.store import (
     CLOUDS,
     DESCRIPTION,
@@ -26,7 +27,7 @@ from doorstate.dataset.store import (
     open_dataset,
 )
 from doorstate.dataset.strata import distance_band, region
-from doorstate.errors import CameraError, CloudContentError, CloudError, ConfigError, DatasetError
+from doorstate.errors import CameraError, CloudError, ConfigError, DatasetError
 from doorstate.files import atomic_path, is_vacant, write_text
 from doorstate.jobs import Progress, default_workers, no_progress, piece_paths, run_pieces
 from doorstate.simulation.generate import replay
@@ -151,7 +152,7 @@ def _prepare_piece(piece: _Piece, path: Path) -> None:
                 cloud, part = _from_simulation(row, piece.num_points)
                 parts.append(part)
             else:
-                cloud = _exactly(read_cloud(piece.source / row["file"], piece.options), piece.num_points)[0]
+                cloud = exactly(read_cloud(piece.source / row["file"], piece.options), piece.num_points)[0]
             clouds.append(cloud)
             reasons.append("")
         except (CloudError, CameraError) as error:
@@ -172,17 +173,7 @@ def _from_simulation(row: dict[str, str], num_points: int) -> tuple[Points, np.n
         raise DatasetError(
             f"{sample.sample_id}: renders differently than its manifest says; simulate it again here"
         )
-    cloud, indices = _exactly(frame.points, num_points)
-    return cloud, frame.cut.part.reshape(-1)[indices]
-
-
-def _exactly(points: Points, num_points: int) -> tuple[Points, np.ndarray]:
-    prepared = prepare_cloud(points, num_points)
-    if len(prepared.points) < num_points:
-        raise CloudContentError(
-            f"too few points: {len(prepared.points)} distinct, {num_points} asked for (--points)"
-        )
-    return prepared
+    return sample_frame(frame, num_points)
 
 
 def _assemble(

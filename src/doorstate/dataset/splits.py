@@ -7,6 +7,8 @@
 `by-pose`: the half-ring is cut into five sectors of bearing and two rings of distance; a fold tests the inner block of
 one sector and the outer block of another. All states of a pose stay together, and poses within 0.5 m of a tested one
 are used by nobody in that fold.
+
+`all`: one "fold" that trains on every sample and tests none, for weights to be used once a recipe has been chosen.
 """
 
 from __future__ import annotations
@@ -25,7 +27,8 @@ from doorstate.simulation.manifest import read_csv, write_csv
 
 Role = Literal["train", "val", "test", "unused"]
 Row = Mapping[str, str]
-PROTOCOLS = ("paper", "by-pose")
+EVERYTHING = "all"
+PROTOCOLS = ("paper", "by-pose", EVERYTHING)
 NUM_FOLDS = 5
 EMBARGO_M = 0.5
 _TENTHS = 10
@@ -35,7 +38,7 @@ def draw_splits(rows: Sequence[Row], protocol: str, seed: int) -> list[dict[str,
     """Role of every sample in every fold.
 
     Returns:
-        One {sample_id: role} per fold; every sample is tested in exactly one fold.
+        One {sample_id: role} per fold; every sample is tested in exactly one fold, under `all` in none.
 
     Raises:
         ConfigError: no such protocol.
@@ -47,6 +50,8 @@ def draw_splits(rows: Sequence[Row], protocol: str, seed: int) -> list[dict[str,
         )
     if protocol not in PROTOCOLS:
         raise ConfigError(f"no protocol {protocol!r}: choose one of {', '.join(PROTOCOLS)}")
+    if protocol == EVERYTHING:
+        return [dict.fromkeys((row["sample_id"] for row in rows), "train")]
     splits = _paper(rows, seed) if protocol == "paper" else _by_pose(rows, seed)
     for fold, roles in enumerate(splits):
         for role in ("train", "val", "test"):

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A prepared data set on disk: `dataset.json`, `manifest.csv`, `clouds.npy`, and `parts.npy` where parts are known."""
+"""A prepared data set on disk: `dataset.json`, `manifest.csv`, `clouds.npy`, and `parts.npy` where parts are known.
+
+Of a simulated one the manifest is enough to look at it: where `dataset.json` says so, single clouds are replayed.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from doorstate.dataset.sampled import sample_frame
 from doorstate.errors import DatasetError
 from doorstate.files import write_text
 from doorstate.simulation.generate import replay
@@ -31,6 +35,7 @@ class DatasetDescription(BaseModel):
     num_points: int
     samples: int
     doorstate_version: str
+    clouds: Literal["stored", "replayed"] = "stored"  # replayed: from the rows of a simulated data set
 
     def save(self, folder: Path) -> None:
         """Write it; the folder counts as complete from here on."""
@@ -38,21 +43,25 @@ class DatasetDescription(BaseModel):
 
 
 class PreparedDataset:
-    """Rows and clouds in the same order; clouds are memory-mapped and in farthest-point order."""
+    """Rows and clouds in the same order; clouds are memory-mapped and in farthest-point order.
+
+    Without stored clouds, as a simulated data set may be, single clouds are rendered and sampled when asked for.
+    """
 
     def __init__(
         self,
         folder: Path,
         description: DatasetDescription,
         rows: list[dict[str, str]],
-        clouds: NDArray[np.float32],
+        clouds: NDArray[np.float32] | None,
         parts: NDArray[np.uint8] | None,
     ) -> None:
         self.folder = folder
         self.description = description
         self.rows = rows
-        self.clouds = clouds  # (M, n, 3) metres
+        self._clouds = clouds
         self._parts = parts
+        self._made: dict[int, tuple[Points, NDArray[np.uint8]]] = {}
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -61,6 +70,19 @@ class PreparedDataset:
     def num_points(self) -> int:
         """Points of every cloud."""
         return self.description.num_points
+
+    @property
+    def clouds(self) -> NDArray[np.float32]:
+        """(M, n, 3) metres.
+
+        Raises:
+            DatasetError: only rows are stored.
+        """
+        if self._clouds is None:
+            raise DatasetError(
+                f"{self.folder}: holds rows without clouds; make them with 'doorstate simulate' and 'doorstate prepare'"
+            )
+        return self._clouds
 
     @cached_property
     def labels(self) -> NDArray[np.int64]:
@@ -81,13 +103,35 @@ class PreparedDataset:
             raise DatasetError(f"{self.folder}: holds no sample {sample_id!r}")
         return self._index[sample_id]
 
-    def cloud(self, index: int) -> Points:
-        """(n, 3) metres, sensor frame."""
-        return np.array(self.clouds[index])
+    def cloud(self, index: int, num_points: int | None = None) -> Points:
+        """(n, 3) metres, sensor frame; the first `num_points` of them if given."""
+        if self._clouds is None:
+            return self._make(index, num_points)[0].copy()
+        return np.array(self._clouds[index, :num_points])
 
-    def parts(self, index: int) -> NDArray[np.uint8] | None:
+    def parts(self, index: int, num_points: int | None = None) -> NDArray[np.uint8] | None:
         """(n,) part of every point (doorstate.types.Part), or None where nobody knows."""
-        return None if self._parts is None else np.array(self._parts[index])
+        if self._clouds is None:
+            return self._make(index, num_points)[1].copy()
+        return None if self._parts is None else np.array(self._parts[index, :num_points])
+
+    def _make(self, index: int, num_points: int | None) -> tuple[Points, NDArray[np.uint8]]:
+        count = num_points or self.num_points
+        if index not in self._made or len(self._made[index][0]) < count:
+            self._made[index] = sample_frame(replay(unflatten(self.rows[index])), count)
+        points, parts = self._made[index]
+        return points[:count], parts[:count]
+
+    def raw_clouds(self, count: int) -> list[Points]:
+        """(H, W, 3) metres as the sensor gives them, of `count` samples spread over a simulated data set.
+
+        Raises:
+            DatasetError: the samples are not simulated.
+        """
+        if self.description.kind != "simulated":
+            raise DatasetError(f"{self.folder}: only simulated frames can be rendered again")
+        step = max(1, len(self.rows) // count)
+        return [replay(unflatten(row)).points for row in self.rows[::step][:count]]
 
     def image(self, index: int) -> NDArray[np.uint8] | None:
         """(H, W, 3) shaded picture, rendered anew from the row; None for imported clouds."""
@@ -108,7 +152,8 @@ def open_dataset(folder: Path) -> PreparedDataset:
         raise DatasetError(f"{folder}: no prepared data set here; make one with 'doorstate prepare'")
     try:
         description = DatasetDescription.model_validate_json(path.read_text(encoding="utf-8"))
-        clouds = np.load(folder / CLOUDS, mmap_mode="r", allow_pickle=False)
+        replayed = description.clouds == "replayed"
+        clouds = None if replayed else np.load(folder / CLOUDS, mmap_mode="r", allow_pickle=False)
         parts_path = folder / PARTS
         parts = np.load(parts_path, mmap_mode="r", allow_pickle=False) if parts_path.is_file() else None
     except ValidationError as error:
@@ -117,10 +162,11 @@ def open_dataset(folder: Path) -> PreparedDataset:
         raise DatasetError(f"{folder}: damaged ({error}); delete it and prepare it again") from error
     rows = read_csv(folder / MANIFEST)
     shape = (description.samples, description.num_points, 3)
-    if clouds.shape != shape or clouds.dtype != np.float32 or len(rows) != description.samples:
-        raise DatasetError(
-            f"{folder}: {CLOUDS} {clouds.shape} and {len(rows)} manifest rows, expected {shape}"
-        )
+    if len(rows) != description.samples or (
+        clouds is not None and (clouds.shape != shape or clouds.dtype != np.float32)
+    ):
+        found = "no clouds" if clouds is None else f"{CLOUDS} {clouds.shape}"
+        raise DatasetError(f"{folder}: {found} and {len(rows)} manifest rows, expected {shape}")
     if parts is not None and (parts.shape != shape[:2] or parts.dtype != np.uint8):
         raise DatasetError(f"{folder}: {PARTS} is {parts.shape}, expected {shape[:2]}")
     for column in ("sample_id", "state"):

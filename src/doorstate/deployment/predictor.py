@@ -83,7 +83,7 @@ class Predictor:
         prepared = prepare_cloud(points, self.points, thin=self.thin)
         with torch.inference_mode():
             logits = self.network(torch.from_numpy(normalize(prepared.points))[None])
-            probabilities = logits.softmax(1)[0].numpy()
+            probabilities = (logits / self.card.temperature).softmax(1)[0].numpy()
         milliseconds = (time.perf_counter() - started) * 1000
         return Prediction(
             DoorState(int(probabilities.argmax())),

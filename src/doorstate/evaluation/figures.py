@@ -16,6 +16,8 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullLocator
 
 from doorstate.dataset.store import PreparedDataset
+from doorstate.evaluation.calibration import reliability_figure
+from doorstate.evaluation.errors_figure import common_errors_figure, surest_errors_figure
 from doorstate.evaluation.metrics import ratio, scores
 from doorstate.evaluation.plan_figures import error_map, poses_figure
 from doorstate.evaluation.results import ComparisonResults, Run
@@ -42,11 +44,14 @@ def draw_figures(results: ComparisonResults, dataset: PreparedDataset) -> dict[s
         results: a checked comparison.
         dataset: the prepared data set that it was trained on.
     """
-    figures = {
+    figures: dict[str, Figure | None] = {
         **dataset_figures(dataset),
         "confusion": confusion_figure(results),
         "spread": spread_figure(results, dataset),
         "learning_curves": learning_figure(results),
+        "reliability": reliability_figure(results),
+        "figure3_misclassified": surest_errors_figure(results, dataset),
+        "figure4_missed_by_most": common_errors_figure(results, dataset),
         "errors_in_plan": error_map(results, dataset),
     }
     return encode_figures(figures)

@@ -6,7 +6,7 @@ from __future__ import annotations
 import base64
 import io
 from collections import Counter, defaultdict
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +18,7 @@ from doorstate.evaluation.results import ComparisonResults, ErrorRow
 from doorstate.evaluation.stratum_tables import is_undecidable
 from doorstate.types import Points
 
-CARDS_PER_NETWORK = 24
+CARDS_PER_NETWORK = 16
 _SHOWN_POINTS = 2048
 _PICTURE_PX = (400, 300)
 
@@ -51,17 +51,15 @@ def build_gallery(results: ComparisonResults, dataset: PreparedDataset) -> Galle
         results: a checked comparison.
         dataset: the prepared data set that it was trained on.
     """
-    rows = {e.sample_id: dataset.rows[dataset.index_of(e.sample_id)] for e in results.error_rows}
     by_network: dict[str, list[ErrorRow]] = defaultdict(list)
     by_sample: dict[str, list[ErrorRow]] = defaultdict(list)
     for error in results.error_rows:
         by_network[error.network].append(error)
         by_sample[error.sample_id].append(error)
+    rows = {name: dataset.rows[dataset.index_of(name)] for name in by_sample}
     chosen: set[str] = set()
     for errors in by_network.values():
-        errors.sort(
-            key=lambda error: (is_undecidable(rows[error.sample_id]), -error.confidence, error.sample_id)
-        )
+        errors.sort(key=order_of_errors(dataset))
         chosen |= {error.sample_id for error in errors[:CARDS_PER_NETWORK]}
     order = sorted(chosen, key=lambda name: (is_undecidable(rows[name]), -len(by_sample[name]), name))
     left_out = Counter(error.network for error in results.error_rows if error.sample_id not in chosen)
@@ -70,6 +68,16 @@ def build_gallery(results: ComparisonResults, dataset: PreparedDataset) -> Galle
         clouds={name: _encode_cloud(dataset, dataset.index_of(name)) for name in order},
         left_out={network: left_out[network] for network in results.networks},
     )
+
+
+def order_of_errors(dataset: PreparedDataset) -> Callable[[ErrorRow], tuple[bool, float, str]]:
+    """Key that sorts errors: decidable ones first, then by how sure the network was."""
+
+    def key(error: ErrorRow) -> tuple[bool, float, str]:
+        row = dataset.rows[dataset.index_of(error.sample_id)]
+        return is_undecidable(row), -error.confidence, error.sample_id
+
+    return key
 
 
 def _card(dataset: PreparedDataset, row: Mapping[str, str], answers: tuple[ErrorRow, ...]) -> Card:
@@ -110,10 +118,10 @@ def _picture_uri(picture: NDArray[np.uint8]) -> str:
 
 
 def _encode_cloud(dataset: PreparedDataset, index: int) -> dict[str, str | None]:
-    points, parts = dataset.cloud(index)[:_SHOWN_POINTS], dataset.parts(index)
+    points, parts = dataset.cloud(index, _SHOWN_POINTS), dataset.parts(index, _SHOWN_POINTS)
     return {
         "points": _base64(_millimetres(points).tobytes()),
-        "parts": None if parts is None else _base64(parts[:_SHOWN_POINTS].tobytes()),
+        "parts": None if parts is None else _base64(parts.tobytes()),
     }
 
 

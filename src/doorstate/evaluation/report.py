@@ -33,30 +33,32 @@ from doorstate.files import write_text
 from doorstate.types import STATES, Part
 
 
-def write_report(comparison_folder: Path, out_html: Path) -> Path:
+def write_report(comparison_folder: Path, out_html: Path, dataset_folder: Path | None = None) -> Path:
     """Write the report of a comparison as one self-contained HTML file.
 
     Args:
         comparison_folder: finished or partly finished.
         out_html: the file to write.
+        dataset_folder: its data set, if it is not where the comparison says.
 
     Raises:
         RunError: the comparison cannot be used.
         DatasetError: its data set or splits cannot be used.
     """
-    results = load_results(comparison_folder)
+    results = load_results(comparison_folder, dataset_folder)
     dataset = open_dataset(results.dataset_folder)
     tables, drawings = build_tables(results, dataset), draw_figures(results, dataset)
     write_text(out_html, render_report(results, dataset, tables, drawings))
     return out_html
 
 
-def write_everything(comparison_folder: Path, out_folder: Path) -> Path:
+def write_everything(comparison_folder: Path, out_folder: Path, dataset_folder: Path | None = None) -> Path:
     """Write `tables/`, `figures/` and `report.html`; the same inputs give the same bytes.
 
     Args:
         comparison_folder: finished or partly finished.
         out_folder: made if absent.
+        dataset_folder: its data set, if it is not where the comparison says.
 
     Returns:
         The report.
@@ -65,7 +67,7 @@ def write_everything(comparison_folder: Path, out_folder: Path) -> Path:
         RunError: the comparison cannot be used.
         DatasetError: its data set or splits cannot be used.
     """
-    results = load_results(comparison_folder)
+    results = load_results(comparison_folder, dataset_folder)
     dataset = open_dataset(results.dataset_folder)
     tables = write_tables(results, dataset, out_folder / "tables")
     drawings = write_figures(results, dataset, out_folder / "figures")

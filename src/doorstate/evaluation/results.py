@@ -18,6 +18,7 @@ from doorstate.dataset.store import MANIFEST
 from doorstate.errors import DatasetError, RunError
 from doorstate.evaluation.metrics import Floats
 from doorstate.simulation.manifest import read_csv
+from doorstate.training.comparison import run_of
 from doorstate.training.run_folder import RunFolder, read_json
 from doorstate.types import STATES, Indices
 
@@ -67,6 +68,7 @@ class Run:
     metrics: Mapping[str, Any]
     log: Mapping[str, Floats]
     environment: Mapping[str, Any]
+    validation: Predictions | None = None
 
     def metric(self, name: str) -> float:
         """A number of `metrics.json`, NaN where the run did not record it."""
@@ -149,11 +151,12 @@ class ComparisonResults:
         )
 
 
-def load_results(comparison_folder: Path) -> ComparisonResults:
+def load_results(comparison_folder: Path, dataset_folder: Path | None = None) -> ComparisonResults:
     """Read a comparison folder; runs without predictions are listed in `missing`, everything else must fit.
 
     Args:
         comparison_folder: holds `comparison.json`, `splits.csv` and `runs/<network>/fold<k>/`.
+        dataset_folder: its data set, if it is not where the comparison says.
 
     Raises:
         RunError: no run is finished, a file is missing or damaged, a network tested a sample twice, or a
@@ -163,14 +166,14 @@ def load_results(comparison_folder: Path) -> ComparisonResults:
     splits = read_splits(comparison_folder / "splits.csv")
     if len(splits) < comparison.folds:
         raise RunError(f"{comparison_folder / 'splits.csv'}: {len(splits)} folds, not {comparison.folds}")
-    dataset_folder = _find_dataset(comparison_folder, comparison.dataset)
+    dataset_folder = dataset_folder or _find_dataset(comparison_folder, comparison.dataset)
     manifest = _read_columns(dataset_folder / MANIFEST, ("sample_id", "state"))
     states = {row["sample_id"]: row["state"] for row in manifest}
     runs = []
     for network in comparison.networks:
         tested: dict[str, int] = {}
         for fold in range(comparison.folds):
-            folder = RunFolder(comparison_folder / "runs" / network / f"fold{fold}")
+            folder = run_of(comparison_folder, network, fold)
             if folder.predictions.exists():
                 run = _read_run(folder, network, fold)
                 _check_run(run, folder.predictions, splits[fold], states, tested)
@@ -204,6 +207,7 @@ def _read_run(folder: RunFolder, network: str, fold: int) -> Run:
         read_json(folder.metrics) if folder.metrics.exists() else {},
         _read_log(folder.log) if folder.log.exists() else {},
         read_json(folder.environment) if folder.environment.exists() else {},
+        _read_predictions(folder.validation, fold) if folder.validation.exists() else None,
     )
 
 

@@ -89,17 +89,14 @@ def _typical_sample(dataset: PreparedDataset, state: str, region: str) -> int | 
 
 def _shown_parts(dataset: PreparedDataset, index: int) -> NDArray[np.uint8]:
     """Parts of the shown points; empty where they are unknown."""
-    parts = dataset.parts(index)
-    return np.empty(0, np.uint8) if parts is None else parts[:_SHOWN_POINTS]
+    parts = dataset.parts(index, _SHOWN_POINTS)
+    return np.empty(0, np.uint8) if parts is None else parts
 
 
 def draw_cloud(axis: Axes, dataset: PreparedDataset, index: int) -> None:
     """Draw a sample's cloud, seen from above and beside, with its opening angle and distance below."""
-    points, parts, row = (
-        dataset.cloud(index)[:_SHOWN_POINTS],
-        _shown_parts(dataset, index),
-        dataset.rows[index],
-    )
+    points, parts = dataset.cloud(index, _SHOWN_POINTS), _shown_parts(dataset, index)
+    row = dataset.rows[index]
     colors = point_colors(points, parts if len(parts) else None)
     screen, order = oblique_view(points)
     # Rasterised: thousands of vector markers would make the SVG slow to open.

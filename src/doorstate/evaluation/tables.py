@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from doorstate.dataset.store import PreparedDataset
+from doorstate.evaluation.calibration import calibration_table
+from doorstate.evaluation.error_kinds import error_kinds_table
 from doorstate.evaluation.metrics import confusion_matrix, scores
 from doorstate.evaluation.results import ComparisonResults
 from doorstate.evaluation.score_tables import (
@@ -50,8 +52,10 @@ def build_tables(results: ComparisonResults, dataset: PreparedDataset) -> dict[s
         },
         "folds": folds_table(results),
         "paired_tests": paired_table(results),
+        "calibration": calibration_table(results),
         "undecidable_accuracy": decidable_table(results, dataset),
         "runs": runs_table(results),
+        "error_kinds": error_kinds_table(results, dataset),
         "misclassified": misclassified_table(results, dataset),
     }
 

@@ -21,6 +21,13 @@ REGION_COLORS = {
     "blue": "#0072B2",
 }
 STATE_COLORS = {"closed": "#0072B2", "semi_open": "#E69F00", "open": "#CC79A7"}
+NETWORK_COLORS = {
+    "pointnet": "#0072B2",
+    "pointnet2": "#D55E00",
+    "dgcnn": "#009E73",
+    "pointcnn": "#CC79A7",
+    "point2sequence": "#E69F00",
+}
 PART_COLORS = {
     Part.WALL: "#A9B1BC",
     Part.FRAME: "#7B4FA3",

@@ -43,6 +43,13 @@ class PointNetwork(nn.Module, ABC):
         """
         return ()
 
+    def use_centres(self, share: float) -> None:
+        """Look at the first `share` (0 to 1) of the centres from now on, for a coarser training; 1 is all of them.
+
+        Nothing changes in a network without a fixed number of centres.
+        """
+        return
+
     @abstractmethod
     def features(self, points: Tensor, neighbourhoods: Neighbourhoods | None = None) -> Tensor:
         """(B, F) global features of (B, N, 3) points."""

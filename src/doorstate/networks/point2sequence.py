@@ -106,6 +106,7 @@ class Point2Sequence(PointNetwork):
             )
         self.region_feature = region_feature
         self.dilation = dilation
+        self.num_centres = NUM_CENTRES
         self.mlps = nn.ModuleList([PooledMLP(0, channels) for channels in AREAS.values()])
         self.encoder = LSTMCell(WIDTH, WIDTH)
         self.decoder = LSTMCell(2 * WIDTH, WIDTH)  # input: [encoder state; previous attention]
@@ -115,17 +116,20 @@ class Point2Sequence(PointNetwork):
         self.head = classification_head(self.feature_size, num_classes, dropout=0.6)
         set_batchnorm(self, eps=batchnorm_eps)
 
+    def use_centres(self, share: float) -> None:
+        self.num_centres = max(1, round(share * NUM_CENTRES))
+
     def neighbourhoods(self, points: Tensor) -> Neighbourhoods:
         """One (B, M, 128): sorted neighbours of the centres; the areas are its first 16, 32, 64 and 128."""
         largest = max(AREAS)
         # Deviation: with fewer than 128 * dilation points the dilation shrinks.
         dilation = min(self.dilation, points.shape[1] // largest)
-        return (knn(points[:, :NUM_CENTRES], points, largest * dilation)[..., ::dilation],)
+        return (knn(points[:, : self.num_centres], points, largest * dilation)[..., ::dilation],)
 
     def sequence(self, points: Tensor, neighbours: Tensor) -> Tensor:
         """(B, M, 4, 128) features of the areas, smallest first; neighbours are (B, M, 128)."""
         offsets = gather_rows(points, neighbours)  # (B, M, 128, 3)
-        offsets = offsets - points[:, :NUM_CENTRES].unsqueeze(2)
+        offsets = offsets - points[:, : self.num_centres].unsqueeze(2)
         areas = [mlp(offsets[:, :, :size]) for size, mlp in zip(AREAS, self.mlps, strict=True)]
         return torch.stack(areas, dim=2)
 
@@ -144,5 +148,5 @@ class Point2Sequence(PointNetwork):
         (neighbours,) = neighbourhoods or self.neighbourhoods(points)
         region, query = self.encode(self.sequence(points, neighbours))
         region = self.attention(region, query) if self.region_feature == "attention" else query
-        pooled: Tensor = self.globals(points[:, :NUM_CENTRES], self.region(region))
+        pooled: Tensor = self.globals(points[:, : self.num_centres], self.region(region))
         return pooled

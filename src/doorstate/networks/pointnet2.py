@@ -55,7 +55,7 @@ class SetAbstraction(nn.Module):
 
     def __init__(self, num_centres: int, radius: float, scales: Sequence[Scale], num_features: int) -> None:
         super().__init__()
-        self.num_centres = num_centres
+        self.all_centres = self.num_centres = num_centres
         self.balls = [(radius * scale.relative_radius, scale.num_samples) for scale in scales]
         self.mlps = nn.ModuleList([PooledMLP(num_features, scale.channels) for scale in scales])
         self.out_channels = sum(scale.channels[-1] for scale in scales)
@@ -115,6 +115,10 @@ class PointNet2(PointNetwork):
         self.level3 = PooledMLP(self.level2.out_channels, (256, 512, 1024))
         self.head = classification_head(self.feature_size, num_classes, dropout)
         set_batchnorm(self, eps=batchnorm_eps)
+
+    def use_centres(self, share: float) -> None:
+        for level in (self.level1, self.level2):
+            level.num_centres = max(1, round(share * level.all_centres))
 
     def neighbourhoods(self, points: Tensor) -> Neighbourhoods:
         """Balls of the first level's scales, then of the second's."""

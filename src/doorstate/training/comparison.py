@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from doorstate.clouds.preparation import NUM_POINTS
-from doorstate.dataset.splits import NUM_FOLDS, PROTOCOLS, draw_splits, read_splits, write_splits
+from doorstate.dataset.splits import EVERYTHING, NUM_FOLDS, PROTOCOLS, draw_splits, read_splits, write_splits
 from doorstate.dataset.store import PreparedDataset, open_dataset
 from doorstate.errors import ConfigError, RunError
 from doorstate.jobs import Progress, default_workers, no_progress, run_pieces
@@ -35,6 +35,10 @@ class Experiment(BaseModel):
     seed: int = 0
     recipe: str = "common"
     recipe_changes: dict[str, Any] = {}  # fields of the recipe that differ
+    network_changes: dict[str, dict[str, Any]] = {}  # for one network, over recipe_changes
+    start_from: str | None = (
+        None  # a comparison whose weights of the same network and fold the runs go on from
+    )
 
     def recipe_of(self, network: str) -> Recipe:
         """The recipe of a network, changes applied.
@@ -43,8 +47,9 @@ class Experiment(BaseModel):
             ConfigError: no such recipe, or a change that it does not know.
         """
         recipe = find_recipe(self.recipe, network)
+        changes = self.recipe_changes | self.network_changes.get(network, {})
         try:
-            return Recipe.model_validate(recipe.model_dump() | self.recipe_changes)
+            return Recipe.model_validate(recipe.model_dump() | changes)
         except ValidationError as error:
             raise ConfigError(f"experiment {self.name}: recipe_changes: {_first(error)}") from error
 
@@ -52,6 +57,10 @@ class Experiment(BaseModel):
         """Raise ConfigError for a name that does not exist, before anything is trained."""
         if self.protocol not in PROTOCOLS:
             raise ConfigError(f"no protocol {self.protocol!r}: choose one of {', '.join(PROTOCOLS)}")
+        if self.protocol == EVERYTHING and self.folds != 1:
+            raise ConfigError(f"experiment {self.name}: protocol {EVERYTHING} has one fold: set folds = 1")
+        if unknown := sorted(set(self.network_changes) - set(list_networks())):
+            raise ConfigError(f"experiment {self.name}: network_changes: no network {unknown[0]!r}")
         for network in self.networks:
             create_network(network)
             self.recipe_of(network)
@@ -86,11 +95,18 @@ def load_experiment(path: Path | None, overrides: Mapping[str, Any]) -> Experime
         except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
             raise ConfigError(f"{path}: cannot be read as an experiment ({error})") from error
         values.setdefault("name", path.stem)
-    changes = values.get("recipe_changes", {}) | overrides.get("recipe_changes", {})
+    given = dict(overrides)
+    wanted = given.pop("recipe_changes", {})
     try:
-        experiment = Experiment.model_validate(values | dict(overrides) | {"recipe_changes": changes})
+        experiment = Experiment.model_validate(values | given)
     except ValidationError as error:
         raise ConfigError(f"{path or 'options'}: {_first(error)}") from error
+    experiment = experiment.model_copy(
+        update={
+            "recipe_changes": experiment.recipe_changes | wanted,
+            "network_changes": {name: own | wanted for name, own in experiment.network_changes.items()},
+        }
+    )
     experiment.check()
     return experiment
 
@@ -98,10 +114,15 @@ def load_experiment(path: Path | None, overrides: Mapping[str, Any]) -> Experime
 def runs_of(experiment: Experiment, folder: Path) -> list[Run]:
     """All runs, fold by fold, so that a partial comparison compares all networks on the same folds."""
     return [
-        Run(network, fold, RunFolder(folder / "runs" / network / f"fold{fold}"))
+        Run(network, fold, run_of(folder, network, fold))
         for fold in range(experiment.folds)
         for network in experiment.networks
     ]
+
+
+def run_of(folder: Path, network: str, fold: int) -> RunFolder:
+    """Where a run of a comparison lies."""
+    return RunFolder(folder / "runs" / network / f"fold{fold}")
 
 
 def compare(
@@ -170,6 +191,9 @@ def train_one(
         num_points=experiment.num_points,
         seed=experiment.seed,
         recipe=experiment.recipe_of(network),
+        start_from=None
+        if experiment.start_from is None
+        else str(run_of(Path(experiment.start_from), network, fold).weights),
     )
     return fit(config, dataset, splits[fold], folder)
 

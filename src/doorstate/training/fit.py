@@ -25,15 +25,15 @@ from torch.nn import functional
 from doorstate.dataset.loader import Batch, CloudLoader
 from doorstate.dataset.splits import Role
 from doorstate.dataset.store import PreparedDataset
-from doorstate.errors import DatasetError, RunError
+from doorstate.errors import ConfigError, DatasetError, RunError, WeightsError
 from doorstate.files import atomic_path
 from doorstate.networks import create_network
 from doorstate.networks.base import PointNetwork
 from doorstate.networks.layers import set_batchnorm
 from doorstate.training.environment import bf16_is_quick, compiled, describe_environment, keep_freed_memory
-from doorstate.training.recipes import Recipe, batchnorm_momentum, learning_rate, points_of_epoch
-from doorstate.training.run_folder import RunFolder
-from doorstate.training.weights import WeightsCard, load_into, save_weights
+from doorstate.training.recipes import Recipe, batchnorm_momentum, learning_rate, resolution_of_epoch
+from doorstate.training.run_folder import RunFolder, write_predictions
+from doorstate.training.weights import WeightsCard, load_into, read_card, save_weights
 from doorstate.types import STATES
 
 _EVALUATION_BATCH = 32
@@ -53,6 +53,7 @@ class RunConfig(BaseModel):
     num_points: int
     seed: int
     recipe: Recipe
+    start_from: str | None = None  # a weights file to go on from
 
 
 class Evaluation(NamedTuple):
@@ -87,16 +88,21 @@ def fit(
     Args:
         config: what to train.
         dataset: clouds.
-        roles: {sample_id: role} of this fold.
+        roles: {sample_id: role} of this fold. Without validation samples the last epoch is kept, without test samples
+            nothing is tested: that is how weights for use are trained on everything, once a recipe has been chosen.
         folder: of this run; finished runs are returned as they are, begun ones are continued.
 
     Returns:
         The run's metrics, as in its `metrics.json`.
 
     Raises:
+        ConfigError: nothing is to be trained, and there are no weights to start from.
         RunError: the folder belongs to another run, or the loss is no longer a number.
         DatasetError: a role has no samples.
+        WeightsError: the weights to start from are missing or do not fit.
     """
+    if config.recipe.epochs == 0 and config.start_from is None:
+        raise ConfigError("0 epochs train nothing: set epochs, or start_from to test existing weights")
     run = RunFolder(folder)
     run.claim(config.model_dump(mode="json"), describe_environment())
     if run.finished:
@@ -108,6 +114,8 @@ def fit(
     with torch.random.fork_rng():
         torch.manual_seed(_seed(config, 0))
         network = _build(config)
+        if config.start_from is not None:
+            _start_from(network, config)
         trainer = _Trainer(config, fabric, network, dataset, samples, run)
         trainer.train()
         metrics = trainer.test()
@@ -152,56 +160,59 @@ class _Trainer:
         self._resume()
 
     def train(self) -> None:
-        recipe, points = self.config.recipe, 0
-        loader = validation = None
+        recipe, num_points = self.config.recipe, self.config.num_points
+        full = resolution_of_epoch(recipe, recipe.epochs - 1, num_points)
+        if recipe.epochs == 0:
+            save_weights(self.run.weights, self.network, self._card())
+        resolution = loader = validation = None
         for epoch in range(len(self.log), recipe.epochs):
             started = time.perf_counter()
-            wanted = points_of_epoch(recipe, epoch, self.config.num_points)
-            if loader is None or validation is None or wanted != points:
-                points = wanted
+            wanted = resolution_of_epoch(recipe, epoch, num_points)
+            if loader is None or validation is None or wanted != resolution:
+                resolution = wanted
+                self.network.use_centres(resolution.centres)
                 search = self.network.neighbourhoods
                 kept = search if self._neighbours_keep() else None
-                loader = CloudLoader(self.dataset, self.samples["train"], points, kept)
-                validation = CloudLoader(self.dataset, self.samples["val"], points, search)
+                loader = CloudLoader(self.dataset, self.samples["train"], resolution.points, kept)
+                validation = CloudLoader(self.dataset, self.samples["val"], resolution.points, search)
             rate, loss = self._epoch(epoch, loader)
-            found = evaluate(self.network, validation, self.fabric)
+            line = {
+                "epoch": epoch,
+                "points": resolution.points,
+                "centres": resolution.centres,
+                "lr": rate,
+                "train_loss": loss,
+            }
+            score = (0.0, float(epoch))  # without validation samples the last epoch is the best
+            if len(validation):
+                found = evaluate(self.network, validation, self.fabric)
+                score = (found.macro_f1, -found.loss)
+                line |= {"val_loss": found.loss, "val_macro_f1": found.macro_f1}
             # The final resolution is what counts: an epoch on coarser clouds is never the best of a run.
-            full = points == points_of_epoch(recipe, recipe.epochs - 1, self.config.num_points)
-            score = (found.macro_f1, -found.loss)
-            if full and score > self.best:
+            if resolution == full and score > self.best:
                 self.best, self.best_epoch = score, epoch
                 save_weights(self.run.weights, self.network, self._card())
-            self.log.append(
-                {
-                    "epoch": epoch,
-                    "points": points,
-                    "lr": rate,
-                    "train_loss": loss,
-                    "val_loss": found.loss,
-                    "val_macro_f1": found.macro_f1,
-                    "seconds": time.perf_counter() - started,
-                }
-            )
+            self.log.append(line | {"seconds": time.perf_counter() - started})
             self._checkpoint()
 
     def test(self) -> dict[str, Any]:
         load_into(self.network, self.run.weights)
         self.network.to(self.fabric.device)
-        tested = self.samples["test"]
-        found = evaluate(self.network, CloudLoader(self.dataset, tested, self.config.num_points), self.fabric)
-        self.run.write_predictions(tested, found.labels, found.probabilities)
-        return {
+        metrics: dict[str, Any] = {
             "network": self.config.network,
             "fold": self.config.fold,
             "best_epoch": self.best_epoch,
-            "val_macro_f1": self.best[0],
-            "test_macro_f1": found.macro_f1,
-            "test_accuracy": found.accuracy,
             "seconds": sum(line["seconds"] for line in self.log),
-            "train_samples": len(self.samples["train"]),
-            "val_samples": len(self.samples["val"]),
-            "test_samples": len(tested),
+            **{f"{role}_samples": len(self.samples[role]) for role in ("train", "val", "test")},
         }
+        for role, path in (("val", self.run.validation), ("test", self.run.predictions)):
+            samples = self.samples[role]
+            if samples:
+                loader = CloudLoader(self.dataset, samples, self.config.num_points)
+                found = evaluate(self.network, loader, self.fabric)
+                write_predictions(path, samples, found.labels, found.probabilities)
+                metrics |= {f"{role}_macro_f1": found.macro_f1, f"{role}_accuracy": found.accuracy}
+        return metrics
 
     def _epoch(self, epoch: int, loader: CloudLoader) -> tuple[float, float]:
         config, recipe = self.config, self.config.recipe
@@ -212,7 +223,7 @@ class _Trainer:
         rate, told = 0.0, time.perf_counter()
         batches = loader.shuffled(recipe.batch_size, recipe.augmentation, (config.seed, config.fold, epoch))
         for iteration, batch in enumerate(batches, start=epoch * per_epoch):
-            rate = learning_rate(recipe, iteration, per_epoch)
+            rate = learning_rate(recipe, iteration, per_epoch, config.num_points)
             for group in self.optimizer.param_groups:
                 group["lr"] = rate
             momentum = batchnorm_momentum(recipe, iteration, per_epoch)
@@ -284,6 +295,16 @@ def _build(config: RunConfig) -> PointNetwork:
     return create_network(config.network, len(STATES), **_network_options(config))
 
 
+def _start_from(network: PointNetwork, config: RunConfig) -> None:
+    path = Path(str(config.start_from))
+    card = read_card(path)
+    if card.network != config.network or card.network_options != _network_options(config):
+        raise WeightsError(
+            f"{path}: is for {card.network} {card.network_options or ''}, not {config.network}"
+        )
+    load_into(network, path)
+
+
 def _network_options(config: RunConfig) -> dict[str, Any]:
     eps = config.recipe.batchnorm_eps
     return config.network_options | ({} if eps is None else {"batchnorm_eps": eps})
@@ -313,7 +334,7 @@ def _samples(roles: Mapping[str, Role]) -> dict[str, list[str]]:
     for sample, role in roles.items():
         samples[role].append(sample)
     for role in ("train", "val", "test"):
-        if len(samples[role]) < 2:
+        if len(samples[role]) == 1 or (role == "train" and not samples[role]):
             raise DatasetError(
                 f"only {len(samples[role])} samples for {role}: the data set is too small for this split"
             )

@@ -4,21 +4,30 @@
 from __future__ import annotations
 
 import math
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from doorstate.clouds.augment import Augmentation
+from doorstate.clouds.preparation import NUM_POINTS
 from doorstate.errors import ConfigError
 
 
 class Stage(BaseModel):
-    """A share of the epochs on clouds cut to so many points; clouds are progressive, so that is a slice."""
+    """A share of the epochs on less of each cloud; clouds are progressive, so that is a slice."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     share: float = Field(gt=0, le=1)
     points: int = Field(ge=128)
+    centres: float = Field(default=1.0, gt=0, le=1)  # share of the network's centres, where it has any
+
+
+class Resolution(NamedTuple):
+    """How much of each cloud an epoch looks at: points, and the share of the network's centres."""
+
+    points: int
+    centres: float
 
 
 class Recipe(BaseModel):
@@ -27,7 +36,7 @@ class Recipe(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     name: str
-    epochs: int = Field(default=30, ge=1)
+    epochs: int = Field(default=30, ge=0)  # 0 tests the weights that a run starts from
     batch_size: int = Field(default=16, ge=2)
     optimizer: Literal["adamw", "adam", "sgd"] = "adamw"
     learning_rate: float = Field(default=1e-3, gt=0)
@@ -45,7 +54,7 @@ class Recipe(BaseModel):
     batchnorm_eps: float | None = None  # None: torch's 1e-5
     batchnorm_momentum: tuple[float, float] | None = None  # first and last, halved with every step
     augmentation: Augmentation = Augmentation()
-    coarse_to_fine: tuple[Stage, ...] = ()  # what the shares leave is trained on all points
+    coarse_to_fine: tuple[Stage, ...] = ()  # what the shares leave is trained on all points and centres
     precision: Literal["auto", "fp32", "bf16"] = "auto"
     compile: bool = False  # torch.compile; docs/speed.md has what it brings
 
@@ -155,9 +164,10 @@ def find_recipe(name: str, network: str) -> Recipe:
     raise ConfigError(f"no recipe {name!r} for {network}: choose common or authors")
 
 
-def learning_rate(recipe: Recipe, iteration: int, iterations_per_epoch: int) -> float:
-    """Rate of an iteration, counted from 0 over the whole training."""
-    total = recipe.epochs * iterations_per_epoch
+def learning_rate(
+    recipe: Recipe, iteration: int, iterations_per_epoch: int, num_points: int = NUM_POINTS
+) -> float:
+    """Rate of an iteration, counted from 0 over the whole training, which ends with `num_points` a cloud."""
     high, low = recipe.learning_rate, recipe.min_learning_rate
     if recipe.schedule == "cosine":
         # As the authors stepped it, once an epoch: the first epoch has the full rate, the last but one step the lowest.
@@ -166,12 +176,25 @@ def learning_rate(recipe: Recipe, iteration: int, iterations_per_epoch: int) -> 
     if recipe.schedule == "steps":
         return max(low, high * recipe.step_factor ** _steps(recipe, iteration, iterations_per_epoch))
     # One cycle (Smith & Topin 2018): a cosine rise from a 25th, then a cosine fall to nearly nothing.
-    rise = max(1.0, recipe.warmup * total)
-    if iteration < rise:
-        return high * (1 / 25 + (1 - 1 / 25) * (1 - math.cos(math.pi * iteration / rise)) / 2)
-    progress = (iteration - rise) / max(1.0, total - rise)
+    progress = _progress(recipe, iteration / iterations_per_epoch, num_points)
+    rise = max(recipe.warmup, 1 / (recipe.epochs * iterations_per_epoch))
+    if progress < rise:
+        return high * (1 / 25 + (1 - 1 / 25) * (1 - math.cos(math.pi * progress / rise)) / 2)
+    fall = (progress - rise) / max(1e-9, 1 - rise)
     floor = max(low, high * 1e-4)
-    return floor + (high - floor) * (1 + math.cos(math.pi * progress)) / 2
+    return floor + (high - floor) * (1 + math.cos(math.pi * min(1.0, fall))) / 2
+
+
+def _progress(recipe: Recipe, epochs: float, num_points: int) -> float:
+    """Share of the training after so many epochs.
+
+    An epoch counts as the root of what it looks at: few fine epochs after many coarse ones then still find a rate
+    they can learn with, and the rate falls to nothing at the resolution that counts.
+    """
+    seen = [resolution_of_epoch(recipe, epoch, num_points) for epoch in range(recipe.epochs)]
+    roots = [math.sqrt(points * centres) for points, centres in seen]
+    whole = int(epochs)
+    return (sum(roots[:whole]) + (epochs - whole) * roots[min(whole, recipe.epochs - 1)]) / sum(roots)
 
 
 def batchnorm_momentum(recipe: Recipe, iteration: int, iterations_per_epoch: int) -> float | None:
@@ -186,8 +209,8 @@ def _steps(recipe: Recipe, iteration: int, iterations_per_epoch: int) -> int:
     return iteration // (recipe.step_iterations or recipe.step_epochs * iterations_per_epoch)
 
 
-def points_of_epoch(recipe: Recipe, epoch: int, num_points: int) -> int:
-    """How many points the clouds of an epoch (from 0) have.
+def resolution_of_epoch(recipe: Recipe, epoch: int, num_points: int) -> Resolution:
+    """How much of each cloud an epoch (from 0) looks at.
 
     Raises:
         ConfigError: the shares of the stages leave nothing for all points.
@@ -196,9 +219,9 @@ def points_of_epoch(recipe: Recipe, epoch: int, num_points: int) -> int:
     for stage in recipe.coarse_to_fine:
         end += stage.share
         if epoch < round(end * recipe.epochs):
-            return min(stage.points, num_points)
+            return Resolution(min(stage.points, num_points), stage.centres)
     if end >= 1:
         raise ConfigError(
             f"recipe {recipe.name}: coarse-to-fine shares add up to {end}: leave some for all points"
         )
-    return num_points
+    return Resolution(num_points, 1.0)

@@ -28,6 +28,7 @@ class RunFolder:
         self.checkpoint = path / "checkpoint.pt"
         self.weights = path / "weights.safetensors"
         self.predictions = path / "predictions.csv"
+        self.validation = path / "validation.csv"  # the same of the samples that the epoch was chosen on
         self.metrics = path / "metrics.json"
 
     @property
@@ -71,33 +72,33 @@ class RunFolder:
         """Write one line per epoch."""
         write_csv(self.log, [{key: f"{value:.6g}" for key, value in line.items()} for line in lines])
 
-    def last_epoch_seconds(self) -> float:
-        """How long the newest epoch of the log took; 0 before the first."""
-        lines = read_csv(self.log) if self.log.is_file() else []
-        return float(lines[-1]["seconds"]) if lines else 0.0
-
-    def write_predictions(
-        self, samples: Sequence[str], labels: np.ndarray, probabilities: np.ndarray
-    ) -> None:
-        """Write the test samples' states and probabilities (M, 3)."""
-        write_csv(
-            self.predictions,
-            [
-                {
-                    "sample_id": sample,
-                    "state": STATES[label],
-                    "predicted": STATES[int(row.argmax())],
-                    **{f"p_{state}": f"{p:.6f}" for state, p in zip(STATES, row, strict=True)},
-                }
-                for sample, label, row in zip(samples, labels, probabilities, strict=True)
-            ],
-        )
+    def read_log(self) -> list[dict[str, str]]:
+        """One line per epoch done so far."""
+        return read_csv(self.log) if self.log.is_file() else []
 
     def finish(self, metrics: Mapping[str, Any]) -> None:
         """Write the metrics, and drop what only a running training needs."""
         write_json(self.metrics, metrics)
         self.checkpoint.unlink(missing_ok=True)
         self.position.unlink(missing_ok=True)
+
+
+def write_predictions(
+    path: Path, samples: Sequence[str], labels: np.ndarray, probabilities: np.ndarray
+) -> None:
+    """Write states and probabilities (M, 3), small ones too: temperature scaling needs their logarithms."""
+    write_csv(
+        path,
+        [
+            {
+                "sample_id": sample,
+                "state": STATES[label],
+                "predicted": STATES[int(row.argmax())],
+                **{f"p_{state}": f"{p:.5g}" for state, p in zip(STATES, row, strict=True)},
+            }
+            for sample, label, row in zip(samples, labels, probabilities, strict=True)
+        ],
+    )
 
 
 def read_json(path: Path) -> dict[str, Any]:

@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 
 import torch
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 
@@ -30,6 +30,7 @@ class WeightsCard(BaseModel):
     num_points: int
     scale_m: float = SCALE_M
     states: tuple[str, ...] = STATES
+    temperature: float = Field(default=1.0, gt=0)  # logits are divided by it (training.calibration)
     trained_on: str = ""
     doorstate_version: str = __version__
 

@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The command that finds out how many points are enough."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+_TIMED_CLOUDS = 9
+
+
+def resolution(
+    study: Annotated[Path, typer.Argument(help="A study file.")],
+    out: Annotated[Path | None, typer.Option(help="Folder of the study; runs/NAME if not given.")] = None,
+    jobs: Annotated[int, typer.Option(help="Runs at the same time.", min=1)] = 1,
+) -> None:
+    """Accuracy and time of finished weights on fewer points; stopped at any moment, it goes on where it was.
+
+    \b
+    Examples:
+      doorstate resolution experiments/resolution.toml
+      doorstate resolution experiments/resolution.toml --jobs 2 --out runs/points
+    """
+    from doorstate.console import live_runs, print_table, progress_bar
+    from doorstate.dataset.store import open_dataset
+    from doorstate.deployment.latency import median_milliseconds
+    from doorstate.deployment.predictor import Predictor
+    from doorstate.evaluation.resolution import (
+        LATENCY,
+        load_resolution,
+        resolution_table,
+        write_resolution,
+    )
+    from doorstate.simulation.manifest import write_csv
+    from doorstate.training.comparison import compare, run_of, runs_of
+    from doorstate.training.environment import keep_freed_memory
+    from doorstate.training.resolution import AS_TRAINED, load_study
+
+    settings = load_study(study)
+    folder = out or Path("runs") / settings.name
+    for name, experiment in settings.experiments():
+        runs = runs_of(experiment, folder / name)
+        recipes = {network: experiment.recipe_of(network) for network in experiment.networks}
+        with live_runs(runs, recipes, experiment.num_points, jobs) as progress:
+            compare(experiment, folder / name, jobs, progress)
+
+    if not (folder / LATENCY).is_file():
+        keep_freed_memory()  # as `doorstate predict` does
+        clouds = open_dataset(Path(settings.dataset)).raw_clouds(_TIMED_CLOUDS)
+        timed = []
+        with progress_bar("Timing") as update:
+            wanted = [(network, points) for network in settings.networks for points in settings.points]
+            for done, (network, points) in enumerate(wanted):
+                weights = run_of(folder / f"{AS_TRAINED}-{points}", network, 0).weights
+                median_ms = median_milliseconds(Predictor.load(weights, points), clouds)
+                timed.append({"network": network, "points": str(points), "median_ms": f"{median_ms:.2f}"})
+                update(done + 1, len(wanted))
+        write_csv(folder / LATENCY, timed)
+
+    write_resolution(folder, folder / "report")
+    table = resolution_table(load_resolution(folder))
+    print_table(table.title, table.columns, table.rows)

@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Accuracy against the number of points, and what each point costs in time, from the folders of a study."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from doorstate.errors import RunError
+from doorstate.evaluation.figures import encode_figures, save_drawings
+from doorstate.evaluation.metrics import scores
+from doorstate.evaluation.results import load_results
+from doorstate.evaluation.score_tables import pooled_confusion
+from doorstate.evaluation.table import Table, number
+from doorstate.evaluation.tables import save_tables
+from doorstate.evaluation.views import NETWORK_COLORS
+from doorstate.simulation.manifest import read_csv
+from doorstate.training.resolution import AS_TRAINED, FINE_TUNED
+
+LATENCY = "latency.csv"
+_NAN = float("nan")
+_FRAME_MS = 1000 / 30
+
+
+@dataclass(frozen=True)
+class ResolutionResults:
+    """Macro-F1 by (network, points), as trained and fine-tuned, and milliseconds from raw cloud to answer."""
+
+    networks: tuple[str, ...]
+    points: tuple[int, ...]
+    as_trained: dict[tuple[str, int], float]
+    fine_tuned: dict[tuple[str, int], float]
+    milliseconds: dict[tuple[str, int], float]
+
+    def best(self, network: str, points: int) -> float:
+        """Macro-F1 of the weights made for this number of points."""
+        return self.fine_tuned.get((network, points), self.as_trained.get((network, points), _NAN))
+
+
+def load_resolution(folder: Path, dataset_folder: Path | None = None) -> ResolutionResults:
+    """Read the folders of a study; what is not there yet is left out.
+
+    Raises:
+        RunError: nothing is there, or a comparison cannot be used.
+    """
+    found: dict[str, dict[tuple[str, int], float]] = {AS_TRAINED: {}, FINE_TUNED: {}}
+    networks: dict[str, None] = {}
+    for path in sorted(folder.glob("*/comparison.json")):
+        kind, _, points = path.parent.name.rpartition("-")
+        if kind not in found or not any(path.parent.glob("runs/*/*/predictions.csv")):
+            continue
+        results = load_results(path.parent, dataset_folder)
+        for network in results.networks:
+            networks[network] = None
+            macro = scores(pooled_confusion(results, network)).macro
+            found[kind][network, int(points)] = float(macro.f1)
+    if not networks:
+        raise RunError(f"{folder}: holds no finished part of a resolution study")
+    rows = read_csv(folder / LATENCY) if (folder / LATENCY).is_file() else []
+    milliseconds = {(row["network"], int(row["points"])): float(row["median_ms"]) for row in rows}
+    points_seen = sorted({points for kind in found.values() for _, points in kind})
+    return ResolutionResults(
+        tuple(networks), tuple(points_seen), found[AS_TRAINED], found[FINE_TUNED], milliseconds
+    )
+
+
+def resolution_table(results: ResolutionResults) -> Table:
+    """A line for each network and number of points."""
+    rows = []
+    for network in results.networks:
+        for points in results.points:
+            key = network, points
+            rows.append(
+                (
+                    network,
+                    str(points),
+                    number(results.as_trained.get(key, _NAN)),
+                    number(results.fine_tuned.get(key, _NAN)),
+                    number(results.milliseconds.get(key, _NAN), 1),
+                )
+            )
+    return Table(
+        "Accuracy and time by number of points",
+        ("network", "points", "macro F1, as trained", "macro F1, fine-tuned", "ms from cloud to answer"),
+        tuple(rows),
+        "As trained: weights trained to the end on the largest number, given fewer points of each cloud. Fine-tuned: "
+        "the same weights trained a little more on so many points. Milliseconds: median from a raw 640 × 480 cloud in "
+        "memory to the state, float32.",
+    )
+
+
+def resolution_figure(results: ResolutionResults) -> Figure:
+    """Macro-F1 against points, and against milliseconds."""
+    figure = Figure(figsize=(9.6, 3.9), layout="constrained")
+    by_points, by_time = figure.subplots(1, 2, sharey=True)
+    for network in results.networks:
+        color = NETWORK_COLORS.get(network, "#333333")
+        known = [points for points in results.points if (network, points) in results.as_trained]
+        by_points.plot(
+            known,
+            [results.as_trained[network, points] for points in known],
+            "o:",
+            color=color,
+            markerfacecolor="none",
+            markersize=4,
+            linewidth=1.0,
+        )
+        by_points.plot(
+            known,
+            [results.best(network, points) for points in known],
+            "o-",
+            color=color,
+            markersize=4,
+            linewidth=1.4,
+            label=network,
+        )
+        timed = [points for points in known if (network, points) in results.milliseconds]
+        by_time.plot(
+            [results.milliseconds[network, points] for points in timed],
+            [results.best(network, points) for points in timed],
+            "o-",
+            color=color,
+            markersize=4,
+            linewidth=1.4,
+        )
+    by_points.set_xscale("log", base=2)
+    by_points.set(xlabel="points (dotted: as trained, without fine-tuning)", ylabel="macro F1")
+    by_points.set_xticks(results.points, [str(points) for points in results.points], minor=False)
+    by_time.set(xlabel="ms from raw cloud to answer")
+    by_time.axvline(_FRAME_MS, color="#999999", linewidth=0.8, linestyle="--")
+    by_time.annotate(
+        "one frame at 30 Hz",
+        (_FRAME_MS, 0.02),
+        xycoords=("data", "axes fraction"),
+        fontsize=8,
+        color="#666666",
+        xytext=(4, 0),
+        textcoords="offset points",
+    )
+    for axis in (by_points, by_time):
+        _tidy(axis)
+    by_points.legend(frameon=False, fontsize=8)
+    return figure
+
+
+def write_resolution(folder: Path, out_folder: Path, dataset_folder: Path | None = None) -> Path:
+    """Write the table and the figure of a study.
+
+    Args:
+        folder: of the study.
+        out_folder: made if absent; gets `tables/` and `figures/`.
+        dataset_folder: its data set, if it is not where the comparisons say.
+
+    Returns:
+        `out_folder`.
+    """
+    results = load_resolution(folder, dataset_folder)
+    save_tables({"resolution": resolution_table(results)}, out_folder / "tables")
+    save_drawings(encode_figures({"resolution": resolution_figure(results)}), out_folder / "figures")
+    return out_folder
+
+
+def _tidy(axis: Axes) -> None:
+    axis.grid(alpha=0.25)
+    axis.spines[["top", "right"]].set_visible(False)

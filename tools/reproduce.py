@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Published results: run them from nothing, publish what a run gave, build every table and figure, check them.
+
+python tools/reproduce.py run paper            # data, all runs, report; goes on where it was stopped
+python tools/reproduce.py publish paper        # runs/paper -> results/paper, without weights
+python tools/reproduce.py build                # tables, figures, reports and docs/results.md from results/
+python tools/reproduce.py check                # the same into a scratch folder: are the committed files those?
+"""
+
+from __future__ import annotations
+
+import shlex
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+REPOSITORY = Path(__file__).resolve().parents[1]
+RESULTS, RUNS, EXPERIMENTS = REPOSITORY / "results", REPOSITORY / "runs", REPOSITORY / "experiments"
+ROWS = RESULTS / "ogurob-4096"  # the data set without its clouds, which are replayed from the rows
+DOORSTATE = Path(sys.executable).with_name("doorstate")
+PAGE = Path("docs") / "results.md"
+
+# What `publish` leaves behind: large, or of use only to a running training.
+_NOT_PUBLISHED = ("*.safetensors", "*.pt", "position.txt", "report")
+
+
+def main(arguments: list[str]) -> None:
+    """Dispatch."""
+    command, names = (arguments[0], arguments[1:]) if arguments else ("", [])
+    if command == "run" and len(names) == 1:
+        run(names[0])
+    elif command == "publish" and names:
+        for name in names:
+            publish(RUNS / name, RESULTS / name)
+    elif command == "build" and not names:
+        build(REPOSITORY)
+    elif command == "check" and not names:
+        sys.exit(check())
+    else:
+        sys.exit(__doc__)
+
+
+def run(name: str) -> None:
+    """Simulate, prepare and run one experiment; every step prints the command it is."""
+    _doorstate("simulate --preset ogurob --out data/ogurob")
+    _doorstate("prepare data/ogurob --out data/ogurob-4096")
+    if name == "resolution":
+        _doorstate(f"resolution experiments/{name}.toml --jobs 2")
+        return
+    _doorstate(f"compare experiments/{name}.toml --jobs 2")
+    if name != "weights":
+        _doorstate(f"report runs/{name}")
+
+
+def publish(source: Path, target: Path) -> None:
+    """Copy what is small of every finished run; unfinished ones are left out."""
+    if not source.is_dir():
+        sys.exit(f"{source}: no such folder; run it first")
+
+    def skipped(folder: str, names: list[str]) -> set[str]:
+        left = set(shutil.ignore_patterns(*_NOT_PUBLISHED)(folder, names))
+        return set(names) if "config.json" in names and "metrics.json" not in names else left
+
+    shutil.copytree(source, target, ignore=skipped, dirs_exist_ok=True)
+
+
+def build(root: Path) -> None:
+    """Write everything that follows from the committed predictions below `root`."""
+    from results_page import write_page
+
+    from doorstate.evaluation.report import write_everything
+    from doorstate.evaluation.resolution import write_resolution
+
+    for folder in _comparisons():
+        write_everything(folder, root / "results" / folder.name / "report", ROWS)
+    if (RESULTS / "resolution").is_dir():
+        write_resolution(RESULTS / "resolution", root / "results" / "resolution" / "report", ROWS)
+    write_page(RESULTS, ROWS, root / PAGE)
+
+
+def check() -> str | None:
+    """Build anew and compare byte for byte; a message if anything differs."""
+    with tempfile.TemporaryDirectory() as scratch:
+        root = Path(scratch)
+        build(root)
+        made = {path.relative_to(root) for path in root.rglob("*") if path.is_file()}
+        committed = {
+            path.relative_to(REPOSITORY)
+            for folder in RESULTS.glob("*/report")
+            for path in folder.rglob("*")
+            if path.is_file()
+        } | {PAGE}
+        lines = [f"{path}: not made any more" for path in sorted(committed - made)]
+        for path in sorted(made):
+            published = REPOSITORY / path
+            if not published.is_file():
+                lines.append(f"{path}: not committed")
+            elif published.read_bytes() != (root / path).read_bytes():
+                lines.append(f"{path}: differs")
+    if lines:
+        return "\n".join([*lines, "python tools/reproduce.py build writes them anew"])
+    print(f"{len(made)} files follow from the committed predictions, byte for byte")
+    return None
+
+
+def _comparisons() -> Iterator[Path]:
+    for path in sorted(RESULTS.glob("*/comparison.json")):
+        yield path.parent
+
+
+def _doorstate(arguments: str) -> None:
+    print(f"\n$ doorstate {arguments}", flush=True)
+    finished = subprocess.run([DOORSTATE, *shlex.split(arguments)], cwd=REPOSITORY, check=False)
+    if finished.returncode:
+        sys.exit(finished.returncode)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: Apache-2.0
+"""docs/results.md from the committed predictions: the words are in results.md.j2, every figure is computed."""
+
+from __future__ import annotations
+
+import json
+from collections import defaultdict
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+from doorstate.dataset.store import PreparedDataset, open_dataset
+from doorstate.evaluation.metrics import Scores, scores
+from doorstate.evaluation.resolution import load_resolution, resolution_table
+from doorstate.evaluation.results import ComparisonResults, load_results
+from doorstate.evaluation.score_tables import pooled_confusion
+from doorstate.evaluation.table import UNDEFINED, Table, number
+from doorstate.evaluation.tables import build_tables
+from doorstate.files import write_text
+from doorstate.types import STATES
+
+BENCHMARK = Path(__file__).resolve().parents[1] / "docs" / "benchmarks" / "networks.json"
+NAMES = {
+    "pointnet": "PointNet",
+    "pointnet2": "PointNet++",
+    "dgcnn": "DGCNN",
+    "pointcnn": "PointCNN",
+    "point2sequence": "Point2Sequence",
+}
+
+
+@dataclass(frozen=True)
+class Published:
+    """One comparison as the page speaks of it."""
+
+    results: ComparisonResults
+    tables: dict[str, Table]
+    scores: dict[str, Scores]  # pooled, by network
+    confusion: dict[str, np.ndarray]
+
+    @property
+    def complete(self) -> bool:
+        return not self.results.missing
+
+    def macro_f1(self, network: str) -> float:
+        return float(self.scores[network].macro.f1)
+
+    def best(self) -> str:
+        return max(self.results.networks, key=self.macro_f1)
+
+    def below(self, bound: float) -> list[str]:
+        """Names of networks whose pooled macro-F1 is below a bound."""
+        return [NAMES[name] for name in self.results.networks if self.macro_f1(name) < bound]
+
+    def least(self) -> float:
+        """Lowest of all precisions, recalls and F1 of all networks and states."""
+        return min(float(np.min([s.precision, s.recall, s.f1])) for s in self.scores.values())
+
+    def lowest_recall(self, state: str) -> tuple[str, float]:
+        """Network with the lowest recall of a state."""
+        index = STATES.index(state)
+        network = min(self.results.networks, key=lambda name: self.scores[name].recall[index])
+        return NAMES[network], float(self.scores[network].recall[index])
+
+    def hits(self, network: str, state: str) -> tuple[int, int]:
+        """Recognised samples of a state, and all of them."""
+        row = self.confusion[network][STATES.index(state)]
+        return int(row[STATES.index(state)]), int(row.sum())
+
+
+def write_page(results_folder: Path, rows_folder: Path, page: Path) -> None:
+    """Render the page.
+
+    Args:
+        results_folder: holds one folder for each published experiment.
+        rows_folder: the data set, rows alone.
+        page: the file to write.
+    """
+    dataset = open_dataset(rows_folder)
+    published = {
+        path.parent.name: _published(path.parent, dataset)
+        for path in sorted(results_folder.glob("*/comparison.json"))
+    }
+    resolution = results_folder / "resolution"
+    environment = Environment(
+        loader=FileSystemLoader(Path(__file__).parent),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    text = environment.get_template("results.md.j2").render(
+        published=published,
+        names=NAMES,
+        states=STATES,
+        budget=_table(budget_table(list(published.values()))),
+        resolution=_table(resolution_table(load_resolution(resolution, rows_folder)))
+        if resolution.is_dir()
+        else None,
+        table=_table,
+        percent=lambda value, digits=2: f"{100 * value:.{digits}f} %",
+    )
+    write_text(page, text)
+
+
+def budget_table(published: list[Published]) -> Table:
+    """What every network cost, and what the same epochs at all points would cost with a public port."""
+    port_ms = _port_milliseconds()
+    rows = []
+    for each in published:
+        costs = defaultdict(list)
+        for run in each.results.runs:
+            epochs = len(run.log["epoch"]) if run.log else 0
+            threads = int(run.environment.get("threads", 1))
+            clouds = epochs * run.metric("train_samples")
+            costs[run.network].append((run.metric("seconds"), threads, epochs, clouds))
+        for network, runs in costs.items():
+            seconds, threads, epochs, clouds = (sum(column) for column in zip(*runs, strict=True))
+            port = clouds * port_ms[network] / 3.6e6 if network in port_ms else float("nan")
+            core_hours = sum(run[0] * run[1] for run in runs) / 3600
+            rows.append(
+                (
+                    each.results.comparison.name,
+                    NAMES[network],
+                    str(len(runs)),
+                    number(epochs / len(runs), 0),
+                    number(seconds / len(runs) / 60, 0),
+                    number(core_hours, 1),
+                    number(2 * port, 0),
+                )
+            )
+    columns = ("experiment", "network", "runs", "epochs", "minutes a run", "core hours", "core hours, port")
+    note = (
+        "Port: the same number of epochs at 4096 points with the public port, from its measured training step "
+        f"(docs/benchmarks/networks.md, two cores). {UNDEFINED}: no port was measured."
+    )
+    return Table("What the runs cost", columns, tuple(rows), note, text_columns=2)
+
+
+def _published(folder: Path, dataset: PreparedDataset) -> Published:
+    results = load_results(folder, dataset.folder)
+    confusion = {network: pooled_confusion(results, network) for network in results.networks}
+    return Published(
+        results,
+        build_tables(results, dataset),
+        {network: scores(counts) for network, counts in confusion.items()},
+        confusion,
+    )
+
+
+def _port_milliseconds() -> dict[str, float]:
+    groups = json.loads(BENCHMARK.read_text(encoding="utf-8"))["groups"].values()
+    return {
+        group["network"]: row["train_ms"]
+        for group in groups
+        if group["points"] == 4096
+        for row in group["rows"]
+        if row["form"] == "port"
+    }
+
+
+def _table(table: Table) -> str:
+    return table.to_markdown().strip()
