@@ -1,9 +1,13 @@
 # make setup: everything into .venv; make demo: the whole pipeline, small; make check, make test: before you commit.
+# make reproduce: the paper's comparison from nothing (EXPERIMENT=by-pose, authors, resolution, weights: those);
+# make reproduce-check: are all published tables and figures what the committed predictions give?
 VENV := .venv
 BIN := $(VENV)/bin
 DEMO := demo
 
-.PHONY: setup check test demo lock clean
+EXPERIMENT := paper
+
+.PHONY: setup check test demo reproduce reproduce-check lock clean
 
 setup: $(VENV)/.complete
 
@@ -22,6 +26,12 @@ test: setup check
 
 demo: setup
 	$(BIN)/python tools/demo.py $(DEMO)
+
+reproduce: setup
+	$(BIN)/python tools/reproduce.py run $(EXPERIMENT)
+
+reproduce-check: setup
+	$(BIN)/python tools/reproduce.py check
 
 # Resolve anew what setup installs; torch stays pinned, since a free torch brings gigabytes of CUDA.
 lock:

@@ -24,7 +24,7 @@ from doorstate.training.weights import WeightsCard, save_weights
 
 Run = Callable[..., tuple[int, str, str]]
 REAL = Path(__file__).resolve().parents[1].parent / "shared" / "real"
-COMMANDS = ("simulate", "prepare", "train", "compare", "report", "predict", "info")
+COMMANDS = ("simulate", "prepare", "train", "compare", "report", "resolution", "predict", "info")
 
 
 @pytest.fixture
@@ -255,6 +255,30 @@ def test_the_pipeline_from_nothing_to_a_report(run: Run, tmp_path: Path) -> None
     code, out, _ = run("predict", depth, "--weights", trained, "--json", *camera)
     assert code == 0
     assert json.loads(out)["points"] == 128
+
+
+def test_resolution_goes_on_from_a_comparison(run: Run, simulated_folder: Path, tmp_path: Path) -> None:
+    clouds, runs, study = tmp_path / "clouds", tmp_path / "runs", tmp_path / "study.toml"
+    assert run("prepare", simulated_folder, "--out", clouds, "--points", 256, "--workers", 1)[0] == 0
+    small = ("--set", "batch_size=8", "--set", "precision=fp32")
+    code, _, err = run(
+        *("compare", "--data", clouds, "--out", runs, "--networks", "pointnet", "--folds", 1),
+        *("--points", 256, "--epochs", 1, *small),
+    )
+    assert code == 0, err
+    study.write_text(
+        f'dataset = "{clouds}"\nstart_from = "{runs}"\nnetworks = ["pointnet"]\npoints = [128, 256]\n'
+        '[fine_tuning]\nepochs = 1\nbatch_size = 8\nprecision = "fp32"\n'
+    )
+    code, out, err = run("resolution", study, "--out", tmp_path / "out")
+    assert code == 0, err
+    lines = [line.replace("│", " ").split() for line in out.splitlines() if "│ pointnet" in line]
+    assert [line[1] for line in lines] == ["128", "256"]
+    report = tmp_path / "out" / "report"
+    assert (report / "figures" / "resolution.png").is_file()
+    before = (tmp_path / "out" / "latency.csv").read_bytes()
+    assert run("resolution", study, "--out", tmp_path / "out")[0] == 0
+    assert (tmp_path / "out" / "latency.csv").read_bytes() == before, "nothing is measured twice"
 
 
 def test_train_makes_one_run(run: Run, small_dataset: PreparedDataset, tmp_path: Path) -> None:

@@ -27,6 +27,8 @@ from doorstate.files import atomic_path
 from doorstate.types import STATES
 
 _DPI = 160
+_PICTURE_DPI = 110  # figures full of pictures are megabytes otherwise
+_PICTURES = ("figure2_samples", "figure3_misclassified", "figure4_missed_by_most")
 _TRAINING, _VALIDATION, _INK = "#0072B2", "#D55E00", "#333333"
 
 
@@ -85,15 +87,19 @@ def save_drawings(drawings: Mapping[str, Drawing], folder: Path) -> None:
 
 def encode_figures(figures: Mapping[str, Figure | None]) -> dict[str, Drawing]:
     """Turn figures into files that are the same each time they are drawn; those that are None are left out."""
-    return {name: _encode(figure) for name, figure in figures.items() if figure is not None}
+    return {
+        name: _encode(figure, _PICTURE_DPI if name in _PICTURES else _DPI)
+        for name, figure in figures.items()
+        if figure is not None
+    }
 
 
-def _encode(figure: Figure) -> Drawing:
+def _encode(figure: Figure, dpi: int) -> Drawing:
     png, svg = io.BytesIO(), io.BytesIO()
     # Without salt and with a date, element names and metadata would differ from run to run.
     with mpl.rc_context({"svg.hashsalt": "doorstate"}):
-        figure.savefig(png, format="png", dpi=_DPI, metadata={"Software": None})
-        figure.savefig(svg, format="svg", dpi=_DPI, metadata={"Date": None, "Creator": None})
+        figure.savefig(png, format="png", dpi=dpi, metadata={"Software": None})
+        figure.savefig(svg, format="svg", dpi=dpi, metadata={"Date": None, "Creator": None})
     return Drawing(png.getvalue(), svg.getvalue())
 
 

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Published tables, figures and pages are what the committed predictions give."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from doorstate.training.run_folder import RunFolder
+
+REPOSITORY = Path(__file__).parents[1]
+TOOLS = REPOSITORY / "tools"
+
+
+@pytest.fixture
+def reproduce(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+    monkeypatch.syspath_prepend(str(TOOLS))
+    spec = importlib.util.spec_from_file_location("reproduce", TOOLS / "reproduce.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    monkeypatch.setitem(sys.modules, "reproduce", module)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.slow
+def test_everything_published_follows_from_the_committed_predictions(reproduce: ModuleType) -> None:
+    assert reproduce.check() is None
+
+
+def test_publishing_takes_what_is_small_of_finished_runs(reproduce: ModuleType, tmp_path: Path) -> None:
+    source = tmp_path / "runs"
+    for fold in (0, 1):
+        run = RunFolder(source / "runs" / "pointnet" / f"fold{fold}")
+        run.claim({"network": "pointnet"}, {"python": "3"})
+        run.path.joinpath("weights.safetensors").write_bytes(b"large")
+        run.path.joinpath("checkpoint.pt").write_bytes(b"larger")
+    RunFolder(source / "runs" / "pointnet" / "fold1").finish({"test_macro_f1": 1.0})
+    (source / "comparison.json").write_text("{}")
+    (source / "report").mkdir()
+    (source / "report" / "report.html").write_text("made anew")
+    reproduce.publish(source, tmp_path / "results")
+    published = [path for path in (tmp_path / "results").rglob("*") if path.is_file()]
+    names = sorted(str(path.relative_to(tmp_path / "results")) for path in published)
+    folder = "runs/pointnet/fold1"
+    assert names == [
+        "comparison.json",
+        *(f"{folder}/{name}" for name in ("config.json", "environment.json", "metrics.json")),
+    ]
+
+
+@pytest.mark.parametrize("arguments", [[], ["run"], ["check", "now"], ["publish"], ["sell", "paper"]])
+def test_wrong_usage_shows_how(reproduce: ModuleType, arguments: list[str]) -> None:
+    with pytest.raises(SystemExit, match=r"reproduce\.py run paper"):
+        reproduce.main(arguments)
