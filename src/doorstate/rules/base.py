@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What every rule takes and says: a cloud in, a state or a reason for none out, with what it found on the way."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict
+
+from doorstate.types import DoorState, Points
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """Something found in the cloud, to be drawn over it: one point is a corner, two an edge, more an outline."""
+
+    name: str  # wall, leaf, opening, jamb, corner, ...
+    points_m: NDArray[np.float64]  # (K, 3) sensor frame
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """A state, or a reason why there is none; and whatever else the rule can tell."""
+
+    state: DoorState | None
+    reason: str = ""  # why there is no state; empty with one
+    opening_angle_deg: float | None = None  # of the leaf against the wall: 0 is closed
+    opening_width_m: float | None = None
+    open_or_not: bool | None = None  # of rules that tell open doors from all others
+    found: tuple[Shape, ...] = field(default=())
+
+    @classmethod
+    def none(cls, reason: str, *found: Shape) -> Answer:
+        """No state, and why."""
+        return cls(None, reason, found=found)
+
+
+class Parameters(BaseModel):
+    """Base of every rule's parameters: frozen, named with units; a comment beside each says where it comes from."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Rule(ABC):
+    """One method. Deterministic: the same cloud gives the same answer."""
+
+    name: ClassVar[str]
+    source: ClassVar[str]  # whose method it reconstructs
+    needs_image: ClassVar[bool] = False  # takes organized (H, W, 3) clouds only
+
+    @abstractmethod
+    def __call__(self, cloud: Points) -> Answer:
+        """State of the door in a cloud.
+
+        Args:
+            cloud: (N, 3), or organized (H, W, 3), metres, x forward, y left, z up, NaN where nothing was measured.
+        """
+
+
+def measured(cloud: Points) -> NDArray[np.float64]:
+    """(M, 3) points that were measured, of a flat or organized cloud; zeros count as not measured."""
+    flat = np.asarray(cloud, dtype=np.float64).reshape(-1, 3)
+    finite = np.isfinite(flat).all(axis=1)
+    kept: NDArray[np.float64] = flat[finite & (flat != 0).any(axis=1)]
+    return kept
