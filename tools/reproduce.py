@@ -4,6 +4,7 @@
 python tools/reproduce.py run paper            # data, all runs, report; goes on where it was stopped
 python tools/reproduce.py publish paper        # runs/paper -> results/paper, without weights
 python tools/reproduce.py build                # tables, figures, reports and docs/results.md from results/
+python tools/reproduce.py again pointnet2 0    # one run from nothing: is it within the published spread?
 python tools/reproduce.py check                # the same into a scratch folder: are the committed files those?
 """
 
@@ -35,6 +36,8 @@ def main(arguments: list[str]) -> None:
     elif command == "publish" and names:
         for name in names:
             publish(RUNS / name, RESULTS / name)
+    elif command == "again" and len(names) == 2 and names[1].isdigit():
+        sys.exit(again(names[0], int(names[1])))
     elif command == "build" and not names:
         build(REPOSITORY)
     elif command == "check" and not names:
@@ -65,6 +68,43 @@ def publish(source: Path, target: Path) -> None:
         return set(names) if "config.json" in names and "metrics.json" not in names else left
 
     shutil.copytree(source, target, ignore=skipped, dirs_exist_ok=True)
+
+
+def again(network: str, fold: int, name: str = "paper") -> str | None:
+    """Train one published run from nothing; a message if its test macro-F1 leaves the published spread.
+
+    The spread is twice the sample standard deviation over the published folds, around the fold's own figure: another
+    machine rounds differently and so trains other weights.
+    """
+    from doorstate.console import live_runs
+    from doorstate.dataset.store import open_dataset
+    from doorstate.evaluation.metrics import mean_and_deviation
+    from doorstate.training.comparison import Run, load_experiment, run_of, train_one
+    from doorstate.training.run_folder import RunFolder
+
+    experiment = load_experiment(EXPERIMENTS / f"{name}.toml", {})
+    published = [run_of(RESULTS / name, network, each) for each in range(experiment.folds)]
+    if not all(run.finished for run in published):
+        return f"results/{name}: not all folds of {network} are published"
+    scores = [run.read_metrics()["test_macro_f1"] for run in published]
+    _, deviation = mean_and_deviation(scores)
+    folder = RunFolder(RUNS / "again" / name / network / f"fold{fold}")
+    with live_runs(
+        [Run(network, fold, folder)], {network: experiment.recipe_of(network)}, experiment.num_points, 1
+    ):
+        found = train_one(
+            experiment,
+            folder.path,
+            open_dataset(Path(experiment.dataset)),
+            network,
+            fold,
+            RESULTS / name / "splits.csv",
+        )["test_macro_f1"]
+    line = f"{network}, fold {fold}: {found:.4f}, published {scores[fold]:.4f}, two deviations {2 * deviation:.4f}"
+    if abs(found - scores[fold]) > 2 * deviation:
+        return f"{line}: outside"
+    print(line)
+    return None
 
 
 def build(root: Path) -> None:

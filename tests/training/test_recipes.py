@@ -28,7 +28,15 @@ PER_EPOCH = 100
 
 def test_every_network_has_an_authors_recipe() -> None:
     assert sorted(AUTHORS) == sorted(list_networks())
-    assert find_recipe("common", "pointnet") is COMMON
+
+
+@pytest.mark.parametrize("network", list_networks())
+def test_the_common_recipe_differs_in_length_alone_and_ends_on_everything(network: str) -> None:
+    recipe = find_recipe("common", network)
+    same = {"epochs": COMMON.epochs, "coarse_to_fine": COMMON.coarse_to_fine}
+    assert recipe.model_copy(update=same) == COMMON
+    assert resolution_of_epoch(recipe, recipe.epochs - 1, 4096) == (4096, 1.0)
+    assert find_recipe("common", "mvcnn") == COMMON
 
 
 @pytest.mark.parametrize("name", ["typo", "Common", ""])

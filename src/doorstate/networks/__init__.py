@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Five classifiers of point clouds, by name."""
+"""Classifiers of point clouds by name: the five of the paper, and a multi-view CNN beside them."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 from doorstate.errors import ConfigError
 from doorstate.networks.base import PointNetwork
 from doorstate.networks.dgcnn import DGCNN
+from doorstate.networks.mvcnn import MVCNN
 from doorstate.networks.point2sequence import Point2Sequence
 from doorstate.networks.pointcnn import PointCNN
 from doorstate.networks.pointnet import PointNet
@@ -21,10 +22,11 @@ NETWORKS: dict[str, type[PointNetwork]] = {
     "pointcnn": PointCNN,
     "point2sequence": Point2Sequence,
 }
+MULTI_VIEW: dict[str, type[PointNetwork]] = {"mvcnn": MVCNN}
 
 
 def list_networks() -> list[str]:
-    """Names that `create_network` knows."""
+    """Names of the point-based networks; `create_network` knows `mvcnn` too."""
     return list(NETWORKS)
 
 
@@ -32,18 +34,19 @@ def create_network(name: str, num_classes: int = 3, **options: Any) -> PointNetw
     """Build an untrained network.
 
     Args:
-        name: one of `list_networks()`.
+        name: one of `list_networks()`, or `mvcnn`.
         num_classes: number of logits.
         options: keyword arguments of the network's class.
 
     Raises:
         ConfigError: Unknown name or option.
     """
-    if name not in NETWORKS:
-        close = get_close_matches(name, NETWORKS, n=1)
-        hint = f"did you mean {close[0]!r}?" if close else f"known are {', '.join(NETWORKS)}"
+    known_networks = NETWORKS | MULTI_VIEW
+    if name not in known_networks:
+        close = get_close_matches(name, known_networks, n=1)
+        hint = f"did you mean {close[0]!r}?" if close else f"known are {', '.join(known_networks)}"
         raise ConfigError(f"there is no network {name!r}: {hint}")
-    network = NETWORKS[name]
+    network = known_networks[name]
     known = network.__init__.__kwdefaults__ or {}
     for option in options:
         if option not in known:
