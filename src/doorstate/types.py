@@ -31,6 +31,8 @@ class DoorState(IntEnum):
 
 
 STATES: tuple[str, ...] = tuple(state.label for state in DoorState)
+NO_ANSWER = "no_answer"  # of a method that says so rather than guess
+ANSWERS: tuple[str, ...] = (*STATES, NO_ANSWER)
 
 
 class Part(IntEnum):

@@ -26,7 +26,13 @@ def test_imported_data_have_the_figures_that_need_no_pose(
 ) -> None:
     results = load_results(make_comparison(imported, {"dgcnn": {"open/3": "closed"}}))
     first = write_figures(results, imported, tmp_path / "figures")
-    assert set(first) == {"figure2_samples", "confusion", "spread", "learning_curves"}
+    assert set(first) == {
+        "figure2_samples",
+        "figure3_misclassified",
+        "confusion",
+        "spread",
+        "learning_curves",
+    }
     expected = {f"{name}.{ending}" for name in first for ending in ("png", "svg")}
     assert {path.name for path in (tmp_path / "figures").iterdir()} == expected
     for name, drawing in first.items():

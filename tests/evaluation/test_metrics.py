@@ -25,7 +25,7 @@ from doorstate.evaluation.metrics import (
 )
 from doorstate.types import Indices
 
-labels = st.lists(st.tuples(st.integers(0, 2), st.integers(0, 2)), min_size=1, max_size=60)
+labels = st.lists(st.tuples(st.integers(0, 2), st.integers(0, 3)), min_size=1, max_size=60)
 
 
 def _draw(count: int, error_rate: float, seed: int) -> tuple[Indices, Indices]:
@@ -36,15 +36,15 @@ def _draw(count: int, error_rate: float, seed: int) -> tuple[Indices, Indices]:
 
 
 def test_confusion_by_hand() -> None:
-    true = np.array([0, 0, 0, 1, 1, 2])
-    predicted = np.array([0, 1, 1, 1, 2, 2])
-    assert confusion_matrix(true, predicted).tolist() == [[1, 2, 0], [0, 1, 1], [0, 0, 1]]
+    true = np.array([0, 0, 0, 1, 1, 2, 2])
+    predicted = np.array([0, 1, 1, 1, 2, 2, 3])
+    assert confusion_matrix(true, predicted).tolist() == [[1, 2, 0, 0], [0, 1, 1, 0], [0, 0, 1, 1]]
 
 
 def test_no_samples_give_an_empty_confusion_and_undefined_scores() -> None:
     empty = np.array([], dtype=np.int64)
     confusion = confusion_matrix(empty, empty)
-    assert confusion.tolist() == [[0] * 3] * 3
+    assert confusion.tolist() == [[0] * 4] * 3
     assert np.isnan(scores(confusion).f1).all()
     assert math.isnan(accuracy(confusion))
 
@@ -56,7 +56,7 @@ def test_confusion_sums(pairs: list[tuple[int, int]]) -> None:
     confusion = confusion_matrix(true, predicted)
     assert confusion.sum() == len(pairs)
     assert confusion.sum(axis=1).tolist() == [np.count_nonzero(true == k) for k in range(3)]
-    assert confusion.sum(axis=0).tolist() == [np.count_nonzero(predicted == k) for k in range(3)]
+    assert confusion.sum(axis=0).tolist() == [np.count_nonzero(predicted == k) for k in range(4)]
     assert accuracy(confusion) == pytest.approx(np.mean(true == predicted))
 
 

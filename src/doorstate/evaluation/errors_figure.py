@@ -13,9 +13,10 @@ from doorstate.dataset.store import PreparedDataset
 from doorstate.evaluation.gallery import order_of_errors
 from doorstate.evaluation.results import ComparisonResults, ErrorRow
 from doorstate.evaluation.samples_figure import draw_cloud
+from doorstate.types import NO_ANSWER
 
 _COLUMNS = 5
-_SHORT = {"closed": "closed", "semi_open": "semi-open", "open": "open"}
+_SHORT = {"closed": "closed", "semi_open": "semi-open", "open": "open", NO_ANSWER: "no answer"}
 
 
 def surest_errors_figure(results: ComparisonResults, dataset: PreparedDataset) -> Figure | None:

@@ -22,7 +22,7 @@ from doorstate.evaluation.metrics import ratio, scores
 from doorstate.evaluation.plan_figures import error_map, poses_figure
 from doorstate.evaluation.results import ComparisonResults, Run
 from doorstate.evaluation.samples_figure import samples_figure
-from doorstate.evaluation.score_tables import f1_intervals, fold_f1, pooled_confusion
+from doorstate.evaluation.score_tables import answers_given, f1_intervals, fold_f1, pooled_confusion
 from doorstate.files import atomic_path
 from doorstate.types import STATES
 
@@ -105,19 +105,19 @@ def _encode(figure: Figure, dpi: int) -> Drawing:
 
 def confusion_figure(results: ComparisonResults) -> Figure:
     """Pooled confusion matrices side by side: counts, shaded by the share of the true state."""
-    networks = results.networks
-    figure = Figure(figsize=(2.5 * len(networks) + 0.6, 3.2), layout="compressed")
+    networks, shown = results.networks, answers_given(results)
+    figure = Figure(figsize=(0.83 * len(shown) * len(networks) + 0.6, 3.2), layout="compressed")
     axes = figure.subplots(1, len(networks), squeeze=False, sharey=True)[0]
     for axis, network in zip(axes, networks, strict=True):
-        counts = pooled_confusion(results, network)
+        counts = pooled_confusion(results, network)[:, : len(shown)]
         share = np.nan_to_num(ratio(counts, counts.sum(axis=1, keepdims=True)))
         axis.imshow(share, cmap="Blues", vmin=0.0, vmax=1.0)
         for (i, j), count in np.ndenumerate(counts):
             axis.text(
                 j, i, str(count), ha="center", va="center", color="white" if share[i, j] > 0.5 else "black"
             )
-        axis.set(title=network, xlabel="predicted", xticks=range(len(STATES)), yticks=range(len(STATES)))
-        axis.set_xticklabels(STATES, fontsize=8)
+        axis.set(title=network, xlabel="predicted", xticks=range(len(shown)), yticks=range(len(STATES)))
+        axis.set_xticklabels([answer.replace("_a", "\na") for answer in shown], fontsize=8)
         axis.set_yticklabels(STATES, fontsize=8)
     axes[0].set_ylabel("true")
     return figure

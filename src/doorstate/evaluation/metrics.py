@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is counted: confusion matrices, their ratios, intervals around them, a paired test between networks.
+"""What is counted: confusion matrices, their ratios, intervals around them, a paired test between methods.
 
-A ratio whose denominator is zero is undefined, hence NaN, never a silent zero. Labels: `DoorState` values.
+A ratio whose denominator is zero is undefined, hence NaN, never a silent zero. Labels: `DoorState` values,
+and one more for no answer, which only a prediction can be.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.stats import binomtest
 from sklearn import metrics as sklearn_metrics
 
-from doorstate.types import STATES, Indices
+from doorstate.types import ANSWERS, STATES, Indices
 
 Floats = NDArray[np.float64]
 Interval = tuple[float, float]
@@ -24,20 +25,19 @@ CONFIDENCE = 0.95
 
 
 def confusion_matrix(true: Indices, predicted: Indices) -> Indices:
-    """Count samples by true state (rows) and predicted state (columns).
+    """Count samples by true state (rows) and answer (columns).
 
     Args:
         true: (N,) labels, may be empty.
-        predicted: (N,) labels.
+        predicted: (N,) labels, or 3 for no answer.
 
     Returns:
-        (3, 3) counts in the order of `STATES`.
+        (3, 4) counts in the order of `STATES` and `ANSWERS`.
     """
-    labels = np.arange(len(STATES))
     if len(true) == 0:  # scikit-learn refuses an empty input
-        return np.zeros((len(labels), len(labels)), dtype=np.int64)
-    counts: Indices = sklearn_metrics.confusion_matrix(true, predicted, labels=labels)
-    return counts
+        return np.zeros((len(STATES), len(ANSWERS)), dtype=np.int64)
+    counts: Indices = sklearn_metrics.confusion_matrix(true, predicted, labels=np.arange(len(ANSWERS)))
+    return counts[: len(STATES)]
 
 
 def ratio(numerator: ArrayLike, denominator: ArrayLike) -> Floats:
@@ -63,17 +63,18 @@ class Scores:
 
 
 def scores(confusion: NDArray[Any]) -> Scores:
-    """Compute precision, recall and F1 of each state.
+    """Compute precision, recall and F1 of each state; no answer is a miss, and no false alarm.
 
     recall = TP / (TP + FN), precision = TP / (TP + FP), F1 = 2 TP / (2 TP + FP + FN): the standard
     definitions. The formulas printed in Kaleci & Turgut 2021 have the first two denominators swapped; the
     words around them describe the standard ones.
 
     Args:
-        confusion: (..., 3, 3) counts, rows true, columns predicted.
+        confusion: (..., 3, 4) counts, rows true, columns answers.
     """
     hits = np.diagonal(confusion, axis1=-2, axis2=-1)  # (..., 3)
-    true_count, predicted_count = confusion.sum(axis=-1), confusion.sum(axis=-2)
+    true_count = confusion.sum(axis=-1)
+    predicted_count = confusion[..., : len(STATES)].sum(axis=-2)
     return Scores(
         precision=ratio(hits, predicted_count),
         recall=ratio(hits, true_count),
@@ -82,7 +83,7 @@ def scores(confusion: NDArray[Any]) -> Scores:
 
 
 def accuracy(confusion: NDArray[Any]) -> float:
-    """Share of samples on the diagonal of a (3, 3) confusion matrix."""
+    """Share of samples on the diagonal of a (3, 4) confusion matrix."""
     return float(ratio(np.trace(confusion), confusion.sum()))
 
 
@@ -122,16 +123,16 @@ def bootstrap_f1(
         generator: source of the draws.
         resamples: number of bootstrap samples.
     """
-    states = len(STATES)
+    states, answers = len(STATES), len(ANSWERS)
     if len(true) == 0:
         undefined = (float("nan"), float("nan"))
         return F1Intervals((undefined,) * states, undefined)
     _, cluster = np.unique(np.asarray(clusters), return_inverse=True)
-    cells = np.zeros((cluster.max() + 1, states * states), dtype=np.int64)
-    np.add.at(cells, (cluster, true * states + predicted), 1)
+    cells = np.zeros((cluster.max() + 1, states * answers), dtype=np.int64)
+    np.add.at(cells, (cluster, true * answers + predicted), 1)
     patterns, counts = np.unique(cells, axis=0, return_counts=True)
     draws = generator.multinomial(len(cells), counts / len(cells), size=resamples)
-    resampled = scores((draws @ patterns).reshape(resamples, states, states))  # (R, 3, 3)
+    resampled = scores((draws @ patterns).reshape(resamples, states, answers))  # (R, 3, 4)
     return F1Intervals(
         tuple(_percentile_interval(values) for values in resampled.f1.T),
         _percentile_interval(resampled.macro.f1),

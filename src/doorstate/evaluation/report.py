@@ -25,7 +25,7 @@ from doorstate.evaluation.gallery import build_gallery, data_uri
 from doorstate.evaluation.metrics import ratio
 from doorstate.evaluation.notes import PROTOCOLS, honest_notes
 from doorstate.evaluation.results import ComparisonResults, load_results
-from doorstate.evaluation.score_tables import pooled_confusion
+from doorstate.evaluation.score_tables import answers_given, pooled_confusion
 from doorstate.evaluation.table import Table
 from doorstate.evaluation.tables import build_tables, dataset_tables, save_tables, write_tables
 from doorstate.evaluation.views import PART_COLORS, STATE_COLORS, VIEW_AZIMUTH_RAD, VIEW_ELEVATION_RAD
@@ -129,6 +129,7 @@ def render_report(
         figures={name: _image_uri(drawing) for name, drawing in drawings.items()},
         confusions=[(network, _confusion_cells(results, network)) for network in results.networks],
         states=STATES,
+        answers=answers_given(results),
         state_colors=STATE_COLORS,
         gallery=gallery,
         page_data={
@@ -152,7 +153,7 @@ def _image_uri(drawing: Drawing) -> str:
 
 def _confusion_cells(results: ComparisonResults, network: str) -> list[list[tuple[int, float]]]:
     """Counts with their share of the true state, row by row; a share of nothing is 0 here, it only tints."""
-    counts = pooled_confusion(results, network)
+    counts = pooled_confusion(results, network)[:, : len(answers_given(results))]
     shares = np.nan_to_num(ratio(counts, counts.sum(axis=1, keepdims=True)))
     return [list(zip(*pair, strict=True)) for pair in zip(counts.tolist(), shares.tolist(), strict=True)]
 

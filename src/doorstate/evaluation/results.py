@@ -20,7 +20,7 @@ from doorstate.evaluation.metrics import Floats
 from doorstate.simulation.manifest import read_csv
 from doorstate.training.comparison import run_of
 from doorstate.training.run_folder import RunFolder, read_json
-from doorstate.types import STATES, Indices
+from doorstate.types import ANSWERS, STATES, Indices
 
 PROBABILITY_COLUMNS = tuple(f"p_{state}" for state in STATES)
 
@@ -41,7 +41,7 @@ class Comparison:
 
 @dataclass(frozen=True, eq=False)
 class Predictions:
-    """Answers to N test samples: labels, and probabilities in the order of `STATES`."""
+    """Answers to N test samples: labels, 3 where there is no answer, and probabilities in the order of `STATES`."""
 
     sample_ids: tuple[str, ...]
     folds: Indices  # (N,) the fold in which a sample was tested
@@ -89,8 +89,8 @@ class ErrorRow:
 
     @property
     def confidence(self) -> float:
-        """Probability given to the wrong answer."""
-        return self.probabilities[STATES.index(self.predicted)]
+        """Probability given to the wrong answer; 0 where there is none."""
+        return self.probabilities[STATES.index(self.predicted)] if self.predicted in STATES else 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +143,7 @@ class ComparisonResults:
                 run.fold,
                 run.predictions.sample_ids[i],
                 STATES[run.predictions.true[i]],
-                STATES[run.predictions.predicted[i]],
+                ANSWERS[run.predictions.predicted[i]],
                 tuple(run.predictions.probabilities[i].tolist()),
             )
             for run in self.runs
@@ -214,9 +214,10 @@ def _read_run(folder: RunFolder, network: str, fold: int) -> Run:
 def _read_predictions(path: Path, fold: int) -> Predictions:
     rows = _read_columns(path, ("sample_id", "state", "predicted", *PROBABILITY_COLUMNS))
     named = [(row["state"], row["predicted"]) for row in rows]
-    if unknown := {name for pair in named for name in pair} - set(STATES):
+    unknown = {state for state, _ in named} - set(STATES) | {answer for _, answer in named} - set(ANSWERS)
+    if unknown:
         raise RunError(f"{path}: {sorted(unknown)[0]!r} is none of {', '.join(STATES)}; test this run again")
-    labels = np.array([[STATES.index(name) for name in pair] for pair in named], dtype=np.int64)
+    labels = np.array([[ANSWERS.index(name) for name in pair] for pair in named], dtype=np.int64)
     true, predicted = labels.reshape(-1, 2).T
     try:
         cells = [[float(row[column]) for column in PROBABILITY_COLUMNS] for row in rows]

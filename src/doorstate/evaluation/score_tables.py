@@ -22,13 +22,19 @@ from doorstate.evaluation.metrics import (
 from doorstate.evaluation.results import ComparisonResults, Predictions
 from doorstate.evaluation.stratum_tables import rows_of
 from doorstate.evaluation.table import UNDEFINED, Table, interval, mean_deviation, number, p_value
-from doorstate.types import STATES, Indices
+from doorstate.types import ANSWERS, STATES, Indices
 
 
 def pooled_confusion(results: ComparisonResults, network: str) -> Indices:
-    """Sum the (3, 3) confusion matrices of a network's folds."""
+    """Sum the (3, 4) confusion matrices of a network's folds."""
     predictions = results.pooled(network)
     return confusion_matrix(predictions.true, predictions.predicted)
+
+
+def answers_given(results: ComparisonResults) -> tuple[str, ...]:
+    """Names of the columns of a confusion matrix: the states, and no answer if there is such a one."""
+    silent = any((run.predictions.predicted >= len(STATES)).any() for run in results.runs)
+    return ANSWERS if silent else STATES
 
 
 def fold_f1(results: ComparisonResults, network: str) -> list[float]:
@@ -47,7 +53,7 @@ def f1_intervals(results: ComparisonResults, dataset: PreparedDataset, network: 
 
 
 def _fold_confusions(results: ComparisonResults, network: str) -> Indices:
-    """Confusion matrices (finished folds, 3, 3) of one network."""
+    """Confusion matrices (finished folds, 3, 4) of one network."""
     parts = [run.predictions for run in results.runs_of(network)]
     return np.stack([confusion_matrix(part.true, part.predicted) for part in parts])
 
@@ -94,15 +100,21 @@ def summary_table(results: ComparisonResults, dataset: PreparedDataset) -> Table
 
 
 def confusion_table(results: ComparisonResults) -> Table:
-    """Table 2: confusion matrices pooled over the folds."""
+    """Table 2: confusion matrices pooled over the folds, with a column for no answer where a method gave none."""
+    shown = answers_given(results)
     rows = [
-        (network, state, *map(str, counts), str(counts.sum()))
+        (network, state, *map(str, counts[: len(shown)]), str(counts.sum()))
         for network in results.networks
         for state, counts in zip(STATES, pooled_confusion(results, network), strict=True)
     ]
     return Table(
         "Table 2. Confusion matrices, summed over the test folds",
-        ("network", "true state", *(f"as {state}" for state in STATES), "total"),
+        (
+            "network",
+            "true state",
+            *(f"as {answer}" if answer in STATES else "no answer" for answer in shown),
+            "total",
+        ),
         tuple(rows),
         text_columns=2,
     )

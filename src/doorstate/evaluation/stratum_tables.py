@@ -13,7 +13,7 @@ from doorstate.dataset.strata import BANDS, REGIONS
 from doorstate.evaluation.metrics import accuracy, confusion_matrix, ratio, scores
 from doorstate.evaluation.results import ComparisonResults, Predictions
 from doorstate.evaluation.table import UNDEFINED, Table, number
-from doorstate.types import STATES, Indices
+from doorstate.types import ANSWERS, STATES, Indices
 
 NO_STRATA = "This data set records no distance bands or angle regions."
 NO_TWINS = "This data set does not record which frames look the same in another state."
@@ -118,11 +118,11 @@ def _stratum_rows(
 
 
 def _stratum_confusions(predictions: Predictions, dataset: PreparedDataset) -> Indices:
-    """Confusion matrices (6, 5, 3, 3) by region and band; the last of each is over all of them."""
-    states = len(STATES)
-    cells = predictions.true * states + predictions.predicted
-    counts = _with_margins(_stratum_counts(rows_of(dataset, predictions), cells, states**2))
-    return counts.reshape(*counts.shape[:2], states, states)  # (6, 5, 3, 3)
+    """Confusion matrices (6, 5, 3, 4) by region and band; the last of each is over all of them."""
+    states, answers = len(STATES), len(ANSWERS)
+    cells = predictions.true * answers + predictions.predicted
+    counts = _with_margins(_stratum_counts(rows_of(dataset, predictions), cells, states * answers))
+    return counts.reshape(*counts.shape[:2], states, answers)  # (6, 5, 3, 4)
 
 
 def _stratum_counts(rows: Sequence[Mapping[str, str]], kinds: ArrayLike, num_kinds: int) -> Indices:
