@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Free way ahead or not: the RoboCup@Home start door check, rebuilt from what is known, not any team's code."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from doorstate.rules.base import Answer, Parameters, Rule, Shape, measured
+from doorstate.rules.planes import thin
+from doorstate.types import DoorState, Points
+
+
+class DepthRegionParameters(Parameters):
+    """The region ahead and what counts as blocked, free or unknown."""
+
+    lane_width_m: float = 0.6  # chosen: service robots are 0.45 to 0.6 m wide
+    strips: int = 6  # chosen: of 0.1 m each, a leaf's edge with its handle blocks one
+    # Forward; chosen: farthest door of the task (3.5 m) and half a metre; less where rooms are small.
+    reach_m: float = 4.0
+    farthest_m: float = 6.0  # chosen: beyond it stereo cameras see things under the floor
+    nearest_m: float = 0.3  # chosen: the robot's own arm and head
+    floor_clearance_m: float = 0.15  # above the lowest points; chosen: noise of the floor, thresholds, mats
+    door_height_m: float = 1.9  # above the lowest points; chosen: below the lintel (2.0 m and more)
+    voxel_m: float = 0.04  # chosen: the region's statistics do not depend on the distance of a surface
+    min_points: int = 8  # in a strip; chosen: voxels of 0.1 x 0.1 m2, more than flying pixels leave
+    min_measured_share: float = 0.3  # of the pixels; chosen: stereo cameras indoors measure half and more
+
+
+class DepthRegionRule(Rule):
+    """Strips of the robot's lane are blocked, free, or unknown: all blocked is closed, all free open, some semi-open.
+
+    A strip is free only where its floor was measured beyond the reach, so that missing readings make it unknown, and
+    then there is no answer. No angle; a leaf that covers the lane reads as closed.
+    """
+
+    name: ClassVar[str] = "depth_region"
+    source: ClassVar[str] = "plain baseline: RoboCup@Home start doors"
+
+    def __init__(self, parameters: DepthRegionParameters | None = None) -> None:
+        self.parameters = parameters or DepthRegionParameters()
+
+    def __call__(self, cloud: Points) -> Answer:
+        p = self.parameters
+        if cloud.ndim == 3 and cloud.size and np.isfinite(cloud[..., 0]).mean() < p.min_measured_share:
+            return Answer.none("too few pixels were measured")
+        points = measured(cloud[::2, ::2] if cloud.ndim == 3 else cloud)
+        points = points[np.abs(points).max(axis=1) < p.farthest_m]
+        if len(points) < p.min_points:
+            return Answer.none("too few points")
+        points = thin(points, p.voxel_m)
+        height_m = points[:, 2] - np.quantile(points[:, 2], 0.01)
+        in_door = (height_m > p.floor_clearance_m) & (height_m < p.door_height_m)
+        before_reach = (points[:, 0] > p.nearest_m) & (points[:, 0] < p.reach_m)
+        floor = (height_m <= p.floor_clearance_m) & (points[:, 0] >= p.reach_m)
+        strip = np.floor((points[:, 1] / p.lane_width_m + 0.5) * p.strips)
+        blocked, free = 0, 0
+        surface_m = []
+        for number in range(p.strips):
+            near_m = points[(strip == number) & in_door & before_reach, 0]
+            if len(near_m) >= p.min_points:
+                blocked += 1
+                surface_m.append(float(np.median(near_m)))
+            elif (floor & (strip == number)).sum() >= p.min_points:
+                free += 1
+        if blocked + free < p.strips:
+            return Answer.none(f"{p.strips - blocked - free} of {p.strips} strips ahead were not measured")
+        if blocked == 0:
+            return Answer(DoorState.OPEN)
+        state = DoorState.CLOSED if free == 0 else DoorState.SEMI_OPEN
+        half, x = p.lane_width_m / 2, float(np.median(surface_m))
+        return Answer(state, found=(Shape("surface", np.array([[x, half, 0.0], [x, -half, 0.0]])),))
