@@ -63,9 +63,10 @@ class AngleBinsRule(Rule):
 
     def __call__(self, cloud: Points) -> Answer:
         p = self.parameters
-        if cloud.ndim == 3 and cloud.size and np.isfinite(cloud[..., 0]).mean() < p.min_measured_share:
+        coarse = every_other(cloud)
+        points = measured(coarse)
+        if coarse.ndim == 3 and len(points) < p.min_measured_share * coarse.size / 3:
             return Answer.none("too few pixels were measured")
-        points = measured(every_other(cloud))
         points = points[np.abs(points).max(axis=1) < p.farthest_m]
         if len(points) < p.min_leaf_points:
             return Answer.none("too few points")
@@ -105,9 +106,9 @@ class AngleBinsRule(Rule):
 def wall_alone(wall: Plane, points: Floats, parameters: WallParameters) -> Answer:
     """State of a wall in which no leaf was found.
 
-    Open where it has a door-wide void between two stretches of wall and something was measured through it; closed
-    where it is unbroken over more than a door's width in the middle of the view (a door flush with its wall cannot be
-    told from the bare wall); else no answer.
+    Open where it has a door-wide void between two stretches of wall, something was measured through it, and nothing
+    stands before it; closed where it is unbroken over more than a door's width in the middle of the view (a door flush
+    with its wall cannot be told from the bare wall); else no answer.
 
     Args:
         wall: its plane.
@@ -118,20 +119,25 @@ def wall_alone(wall: Plane, points: Floats, parameters: WallParameters) -> Answe
     below_lintel = points[:, 2] < p.low_m
     behind_m = wall.distances_m(points)
     along = _along(wall)
-    on_wall = points[below_lintel & off_floor(points, p.floor_margin_m) & (np.abs(behind_m) <= p.threshold_m)]
+    off_ground = off_floor(points, p.floor_margin_m)
+    on_wall = points[below_lintel & off_ground & (np.abs(behind_m) <= p.threshold_m)]
     if len(on_wall) == 0:
         return Answer.none("no wall at the camera's height")
     shape = outline("wall", wall, on_wall)
     start = float((on_wall @ along).min())
     solid = _filled(on_wall @ along - start, p.bin_m)
-    through = points[below_lintel & (behind_m > p.behind_m)]
-    # Where the sight lines to what is behind the wall cross it.
-    crossing = (through @ along) * wall.offset_m / (through @ wall.normal) - start
-    seen = _filled(crossing[(crossing >= 0) & (crossing < len(solid) * p.bin_m)], p.bin_m, len(solid))
+    # Where the sight lines to what is behind or before the wall cross it.
+    crossing = (points @ along) * wall.offset_m / np.maximum(points @ wall.normal, 1e-6) - start
+    crosses = (crossing >= 0) & (crossing < len(solid) * p.bin_m) & below_lintel
+    seen = _filled(crossing[crosses & (behind_m > p.behind_m)], p.bin_m, len(solid))
+    # A leaf seen from its edge, most of all: it may stand at any angle.
+    before = _filled(crossing[crosses & off_ground & (behind_m < -p.behind_m)], p.bin_m, len(solid))
     covered = np.flatnonzero(solid)
     for last, first in itertools.pairwise(covered):
         width_m = float(first - last - 1) * p.bin_m
         fits = p.opening_width_m[0] <= width_m <= p.opening_width_m[1]
+        if fits and before[last : first + 1].any():
+            return Answer.none("something stands before the opening", shape)
         if fits and seen[last + 1 : first].mean() >= p.seen_through_share:
             edges = [start + (last + 1) * p.bin_m, start + first * p.bin_m]
             opening = Shape(

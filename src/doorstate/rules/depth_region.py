@@ -23,6 +23,7 @@ class DepthRegionParameters(Parameters):
     nearest_m: float = 0.3  # chosen: the robot's own arm and head
     floor_clearance_m: float = 0.15  # above the lowest points; chosen: noise of the floor, thresholds, mats
     door_height_m: float = 1.9  # above the lowest points; chosen: below the lintel (2.0 m and more)
+    camera_height_m: float = 0.2  # above the floor, at least; chosen: a low robot's
     voxel_m: float = 0.04  # chosen: the region's statistics do not depend on the distance of a surface
     min_points: int = 8  # in a strip; chosen: voxels of 0.1 x 0.1 m2, more than flying pixels leave
     min_measured_share: float = 0.3  # of the pixels; chosen: stereo cameras indoors measure half and more
@@ -43,9 +44,10 @@ class DepthRegionRule(Rule):
 
     def __call__(self, cloud: Points) -> Answer:
         p = self.parameters
-        if cloud.ndim == 3 and cloud.size and np.isfinite(cloud[..., 0]).mean() < p.min_measured_share:
+        coarse = cloud[::2, ::2] if cloud.ndim == 3 else cloud
+        points = measured(coarse)
+        if coarse.ndim == 3 and len(points) < p.min_measured_share * coarse.size / 3:
             return Answer.none("too few pixels were measured")
-        points = measured(cloud[::2, ::2] if cloud.ndim == 3 else cloud)
         points = points[np.abs(points).max(axis=1) < p.farthest_m]
         if len(points) < p.min_points:
             return Answer.none("too few points")
@@ -53,7 +55,8 @@ class DepthRegionRule(Rule):
         height_m = points[:, 2] - np.quantile(points[:, 2], 0.01)
         in_door = (height_m > p.floor_clearance_m) & (height_m < p.door_height_m)
         before_reach = (points[:, 0] > p.nearest_m) & (points[:, 0] < p.reach_m)
-        floor = (height_m <= p.floor_clearance_m) & (points[:, 0] >= p.reach_m)
+        on_floor = (height_m <= p.floor_clearance_m) & (points[:, 2] < -p.camera_height_m)
+        floor = on_floor & (points[:, 0] >= p.reach_m)
         strip = np.floor((points[:, 1] / p.lane_width_m + 0.5) * p.strips)
         blocked, free = 0, 0
         surface_m = []

@@ -20,12 +20,12 @@ class PlaneStateParameters(Parameters):
     voxel_m: float = 0.04  # chosen: twenty points across a leaf
     # Chosen: range of the Xtion; beyond it noise of stereo cameras exceeds planes' thresholds.
     farthest_m: float = 5.0
-    neighbours: int = 16  # of a normal; chosen: a patch of 0.16 m, small against a leaf, large against noise
+    neighbours: int = 12  # of a normal; chosen: a patch of 0.14 m, small against a leaf, large against noise
     tilt_deg: float = 15.0  # of an upright normal; chosen: noise, and a few degrees of the camera's tilt
     heading_bin_deg: float = 4.0  # chosen: finer than the tolerance
     # Chosen: noise of normals, half the smallest semi-open angle of the data.
     heading_tolerance_deg: float = 8.0
-    most_planes: int = 8  # chosen: a corridor with its doors
+    most_planes: int = 6  # chosen: wall, leaf, reveals, and a corridor
     trials: int = 50  # chosen: enough for a plane of a third of the points, 99 times in 100
     min_points: int = 40  # of a plane; chosen: voxels of 0.06 m2
     # Chosen: wider than a reveal, no wider than a single door.

@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The start door check: all of the lane blocked, part of it, none of it, and missing readings, never free."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hand_made import Rectangle, door, see
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from doorstate.rules.depth_region import DepthRegionParameters, DepthRegionRule
+from doorstate.types import DoorState
+
+RULE = DepthRegionRule()
+
+
+def _frame() -> list[Rectangle]:
+    *frame, _ = door(0, distance_m=2.0)
+    return frame
+
+
+@pytest.mark.parametrize("distance", [1.0, 2.0, 3.5])
+def test_a_surface_across_the_lane_is_closed(distance: float) -> None:
+    answer = RULE(see(door(0, distance_m=distance)))
+    assert answer.state == DoorState.CLOSED
+    assert answer.opening_angle_deg is None
+    assert answer.found[0].points_m[:, 0] == pytest.approx(distance, abs=0.05)
+
+
+def test_a_free_lane_is_open_though_the_lintel_is_above_it() -> None:
+    assert RULE(see(_frame())).state == DoorState.OPEN
+
+
+def test_a_leaf_in_part_of_the_lane_is_semi_open() -> None:
+    assert RULE(see([*_frame(), ((1.6, 0.45), (1.5, 0.05), -0.99, 1.0)])).state == DoorState.SEMI_OPEN
+
+
+def test_a_surface_beyond_the_reach_leaves_the_way_free() -> None:
+    seen = see(door(0, distance_m=3.5))
+    assert DepthRegionRule(DepthRegionParameters(reach_m=2.0))(seen).state == DoorState.OPEN
+
+
+@settings(max_examples=25, deadline=None, derandomize=True)
+@given(seed=st.integers(0, 99), share=st.floats(0, 1), left=st.integers(0, 319), right=st.integers(0, 319))
+def test_no_loss_of_readings_opens_a_closed_door(seed: int, share: float, left: int, right: int) -> None:
+    seen = see(door(0, distance_m=2.0))
+    lost = np.random.default_rng(seed).random(seen.shape[:2]) < share
+    lost[:, min(left, right) : max(left, right)] = True
+    answer = RULE(np.where(lost[..., None], np.nan, seen).astype(np.float32))
+    assert answer.state in (DoorState.CLOSED, None)
+
+
+def test_an_open_way_with_an_unmeasured_strip_has_no_answer() -> None:
+    seen = see(_frame())
+    seen[:, 150:170] = np.nan
+    answer = RULE(seen)
+    assert answer.state is None
+    assert "strips" in answer.reason
+
+
+def test_a_black_leaf_under_a_window_is_not_open() -> None:
+    seen = see([*_frame(), ((4.5, 3.0), (4.5, -3.0), -1.0, 1.6)])
+    seen[120:] = np.nan  # the leaf and the floor; above it the room behind is measured
+    answer = RULE(seen)
+    assert answer.state is None
+
+
+def test_flat_and_organized_clouds_agree() -> None:
+    for scene in (door(0), _frame()):
+        seen = see(scene)
+        assert RULE(seen.reshape(-1, 3)).state == RULE(seen).state is not None
+
+
+@pytest.mark.parametrize(
+    ("cloud", "reason"),
+    [
+        (np.empty((0, 3), np.float32), "too few points"),
+        (np.full((48, 64, 3), np.nan, np.float32), "too few pixels"),
+        (np.zeros((48, 64, 3), np.float32), "too few pixels"),
+        (np.full((900, 3), np.nan, np.float32), "too few points"),
+    ],
+    ids=["empty", "all NaN", "zeros", "flat NaN"],
+)
+def test_clouds_without_points_have_a_reason(cloud: np.ndarray, reason: str) -> None:
+    answer = RULE(cloud)
+    assert answer.state is None
+    assert reason in answer.reason
+
+
+@settings(max_examples=20, deadline=None, derandomize=True)
+@given(
+    seed=st.integers(0, 999),
+    count=st.sampled_from([1, 3, 70, 3000]),
+    flat=st.sampled_from([(1, 1, 1), (0, 1, 1), (1, 0, 1), (1, 1, 0), (0, 0, 1), (0, 0, 0)]),
+    unit=st.sampled_from([0.01, 1.0, 1000.0, 1e38]),
+)
+def test_no_heap_of_points_raises(seed: int, count: int, flat: tuple[int, int, int], unit: float) -> None:
+    points = np.random.default_rng(seed).normal(0, 1, (count, 3)) * flat + [2.0, 0.0, 0.1]
+    answer = RULE((points * unit).astype(np.float32))
+    assert (answer.state is None) == bool(answer.reason)
