@@ -69,8 +69,8 @@ COMMON = Recipe(name="common", augmentation=Augmentation(yaw_deg=15.0))
 _LENGTHS: dict[str, tuple[int, tuple[Stage, ...]]] = {
     "pointnet": (48, (Stage(share=0.9375, points=512),)),
     "pointnet2": (8, (Stage(share=0.75, points=1024, centres=0.5),)),
-    "dgcnn": (14, (Stage(share=0.715, points=256), Stage(share=0.214, points=1024))),
-    "pointcnn": (14, (Stage(share=0.86, points=512),)),
+    "dgcnn": (13, (Stage(share=0.77, points=256), Stage(share=0.077, points=1024))),
+    "pointcnn": (12, (Stage(share=0.84, points=512),)),
     "point2sequence": (10, (Stage(share=0.8, points=4096, centres=0.25),)),
 }
 
