@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Lines in plan view: found among other points, and what is measured against them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from doorstate.rules.plan_lines import Line, fit_line, strongest_line
+
+DIAGONAL = Line(np.array([2.0, 0.0]), np.array([0.6, 0.8]))
+
+
+def test_the_longer_of_two_lines_is_found_and_the_heavier_when_weighted() -> None:
+    along = np.linspace(-1, 1, 60)[:, None]
+    long = np.array([3.0, 0.0]) + along * np.array([0.0, 1.0])
+    short = np.array([2.0, 0.0]) + along[:40] * np.array([0.6, 0.8])
+    points = np.concatenate([long, short])
+    found = strongest_line(points, 0.01)
+    assert found is not None
+    assert found[0].angle_deg(Line(np.zeros(2), np.array([0.0, 1.0]))) < 0.5
+    assert found[1][:60].all()
+    heavy = strongest_line(points, 0.01, np.repeat([1.0, 5.0], [60, 40]))
+    assert heavy is not None
+    assert heavy[0].angle_deg(DIAGONAL) < 0.5
+
+
+@pytest.mark.parametrize("points", [np.empty((0, 2)), np.ones((1, 2)), np.ones((9, 2))])
+def test_points_that_are_no_line_give_none(points: np.ndarray) -> None:
+    assert strongest_line(points, 0.01) is None
+
+
+def test_a_fitted_line_goes_through_its_points() -> None:
+    points = np.array([[1.0, 1.0], [2.0, 3.0], [3.0, 5.0]])
+    np.testing.assert_allclose(fit_line(points).behind_m(points), 0.0, atol=1e-12)
+
+
+def test_behind_is_away_from_the_camera() -> None:
+    assert DIAGONAL.behind_m(np.array([[5.0, 0.0]]))[0] == pytest.approx(2.4)
+    assert DIAGONAL.behind_m(np.zeros((1, 2)))[0] == pytest.approx(-1.6)
+
+
+def test_foot_and_crossing_are_on_the_line() -> None:
+    np.testing.assert_allclose(DIAGONAL.foot(np.array([2.8, -0.6])), [2.0, 0.0], atol=1e-12)
+    across = Line(np.array([0.0, 1.6]), np.array([1.0, 0.0]))
+    np.testing.assert_allclose(DIAGONAL.crossing(across), [3.2, 1.6])
