@@ -86,6 +86,7 @@ class OpenDoorRule(Rule):
     name = "open_door"
     source = "Kaleci & Turgut 2020 (a reconstruction from what is known, not the authors' code)"
     needs_image = True
+    parameters: OpenDoorParameters
 
     def __init__(self, parameters: OpenDoorParameters | None = None) -> None:
         self.parameters = parameters or OpenDoorParameters()

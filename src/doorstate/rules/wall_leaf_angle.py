@@ -97,6 +97,7 @@ class WallLeafAngleRule(Rule):
     source = (
         "Ning et al. 2023, Quintana et al. 2018 (a reconstruction from what is known, not the authors' code)"
     )
+    parameters: WallLeafAngleParameters
 
     def __init__(self, parameters: WallLeafAngleParameters | None = None) -> None:
         self.parameters = parameters or WallLeafAngleParameters()
