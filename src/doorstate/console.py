@@ -116,4 +116,6 @@ class _RunWatch:
         position = run.folder.read_position()
         if not position:
             return "[dim]-[/dim]"
+        if run.network not in self._recipes:  # a rule
+            return f"{position:.0%}"
         return f"{position:.1f} / {self._recipes[run.network].epochs}"

@@ -76,6 +76,9 @@ def compare(
     networks: Annotated[
         str | None, typer.Option(help="Names, separated by commas; all five if not given.")
     ] = None,
+    rules: Annotated[
+        str | None, typer.Option(help="Rules to ask beside the networks, separated by commas.")
+    ] = None,
     folds: Annotated[
         int | None, typer.Option(help="How many of the five folds to run.", min=1, max=5)
     ] = None,
@@ -102,7 +105,8 @@ def compare(
     given: dict[str, Any] = {
         "dataset": None if data is None else str(data),
         "protocol": protocol,
-        "networks": None if networks is None else tuple(name.strip() for name in networks.split(",")),
+        "networks": _names(networks),
+        "rules": _names(rules),
         "folds": folds,
         "num_points": points,
         "seed": seed,
@@ -123,7 +127,7 @@ def compare(
     print_table(
         f"{settings.name}: macro-F1 on the test folds (protocol {settings.protocol}, {settings.num_points} points)",
         ["network", *(f"fold {fold}" for fold in range(settings.folds)), "mean"],
-        [_score_row(network, metrics) for network in settings.networks],
+        [_score_row(method, metrics) for method in settings.methods],
     )
     stdout.print(f"next: doorstate report {folder}", soft_wrap=True)
 
@@ -153,6 +157,10 @@ def report(
         else:
             page = write_dataset_figures(folder, target)
     stdout.print(f"report: {page}", soft_wrap=True)
+
+
+def _names(text: str | None) -> tuple[str, ...] | None:
+    return None if text is None else tuple(name.strip() for name in text.split(",") if name.strip())
 
 
 def _score_row(network: str, metrics: list[dict[str, Any]]) -> list[str]:

@@ -122,16 +122,16 @@ class PreparedDataset:
         points, parts = self._made[index]
         return points[:count], parts[:count]
 
-    def raw_clouds(self, count: int) -> list[Points]:
-        """(H, W, 3) metres as the sensor gives them, of `count` samples spread over a simulated data set.
-
-        Raises:
-            DatasetError: the samples are not simulated.
-        """
+    def raw_cloud(self, index: int) -> Points:
+        """(H, W, 3) metres as the sensor gives them, rendered anew; of imported clouds what is stored."""
         if self.description.kind != "simulated":
-            raise DatasetError(f"{self.folder}: only simulated frames can be rendered again")
+            return self.cloud(index)
+        return replay(unflatten(self.rows[index])).points
+
+    def raw_clouds(self, count: int) -> list[Points]:
+        """`raw_cloud` of so many samples, spread over the data set."""
         step = max(1, len(self.rows) // count)
-        return [replay(unflatten(row)).points for row in self.rows[::step][:count]]
+        return [self.raw_cloud(index) for index in range(0, len(self.rows), step)[:count]]
 
     def image(self, index: int) -> NDArray[np.uint8] | None:
         """(H, W, 3) shaded picture, rendered anew from the row; None for imported clouds."""

@@ -164,6 +164,7 @@ def _facts(results: ComparisonResults, dataset: PreparedDataset) -> dict[str, st
     roles = [results.role_counts(fold) for fold in range(comparison.folds)]
     return {
         "Networks": ", ".join(comparison.networks),
+        **({"Rules": ", ".join(comparison.rules)} if comparison.rules else {}),
         "Runs": f"{len(results.runs)} of {len(results.runs) + len(results.missing)}",
         "Data": f"{dataset.description.source} ({dataset.description.kind})",
         "Samples": f"{len(states)}: " + ", ".join(f"{states.count(state)} {state}" for state in STATES),

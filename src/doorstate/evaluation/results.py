@@ -37,6 +37,12 @@ class Comparison:
     num_points: int
     seed: int
     recipe: Mapping[str, Any] = field(default_factory=dict)
+    rules: tuple[str, ...] = ()
+
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """Networks and rules."""
+        return self.networks + self.rules
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +54,8 @@ class Predictions:
     true: Indices  # (N,)
     predicted: Indices  # (N,)
     probabilities: Floats  # (N, 3)
+    angles_deg: Floats  # (N,) opening angles a rule gave, NaN where it gave none
+    reasons: tuple[str, ...] = ()  # N reasons for no answer, or none at all
 
     @property
     def right(self) -> NDArray[np.bool_]:
@@ -104,15 +112,15 @@ class ComparisonResults:
 
     @property
     def networks(self) -> tuple[str, ...]:
-        """Networks with at least one finished run."""
+        """Networks and rules with at least one finished run."""
         finished = {run.network for run in self.runs}
-        return tuple(network for network in self.comparison.networks if network in finished)
+        return tuple(network for network in self.comparison.methods if network in finished)
 
     @property
     def missing(self) -> tuple[tuple[str, int], ...]:
         """Pairs (network, fold) that were asked for and have no predictions."""
         finished = {(run.network, run.fold) for run in self.runs}
-        asked = ((name, fold) for name in self.comparison.networks for fold in range(self.comparison.folds))
+        asked = ((name, fold) for name in self.comparison.methods for fold in range(self.comparison.folds))
         return tuple(pair for pair in asked if pair not in finished)
 
     def runs_of(self, network: str) -> tuple[Run, ...]:
@@ -128,6 +136,8 @@ class ComparisonResults:
             np.concatenate([part.true for part in parts]),
             np.concatenate([part.predicted for part in parts]),
             np.concatenate([part.probabilities for part in parts]),
+            np.concatenate([part.angles_deg for part in parts]),
+            tuple(reason for part in parts for reason in part.reasons),
         )
 
     def role_counts(self, fold: int) -> Counter[str]:
@@ -170,7 +180,7 @@ def load_results(comparison_folder: Path, dataset_folder: Path | None = None) ->
     manifest = _read_columns(dataset_folder / MANIFEST, ("sample_id", "state"))
     states = {row["sample_id"]: row["state"] for row in manifest}
     runs = []
-    for network in comparison.networks:
+    for network in comparison.methods:
         tested: dict[str, int] = {}
         for fold in range(comparison.folds):
             folder = run_of(comparison_folder, network, fold)
@@ -221,13 +231,19 @@ def _read_predictions(path: Path, fold: int) -> Predictions:
     true, predicted = labels.reshape(-1, 2).T
     try:
         cells = [[float(row[column]) for column in PROBABILITY_COLUMNS] for row in rows]
+        angles_deg = np.array(
+            [float(row.get("opening_angle_deg") or "nan") for row in rows], dtype=np.float64
+        )
     except ValueError as error:
         raise RunError(f"{path}: {error}; test this run again") from error
     probabilities = np.array(cells, dtype=np.float64).reshape(len(rows), len(STATES))
     if not np.isfinite(probabilities).all():
         raise RunError(f"{path}: a probability is not finite; train this run again")
     sample_ids = tuple(row["sample_id"] for row in rows)
-    return Predictions(sample_ids, np.full(len(rows), fold), true, predicted, probabilities)
+    reasons = tuple(row["reason"] for row in rows if "reason" in row)
+    return Predictions(
+        sample_ids, np.full(len(rows), fold), true, predicted, probabilities, angles_deg, reasons
+    )
 
 
 def _read_log(path: Path) -> dict[str, Floats]:

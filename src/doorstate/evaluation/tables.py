@@ -11,6 +11,7 @@ from doorstate.evaluation.calibration import calibration_table
 from doorstate.evaluation.error_kinds import error_kinds_table
 from doorstate.evaluation.metrics import confusion_matrix, scores
 from doorstate.evaluation.results import ComparisonResults
+from doorstate.evaluation.rule_tables import angle_table, reasons_table
 from doorstate.evaluation.score_tables import (
     confusion_table,
     folds_table,
@@ -55,9 +56,15 @@ def build_tables(results: ComparisonResults, dataset: PreparedDataset) -> dict[s
         "calibration": calibration_table(results),
         "undecidable_accuracy": decidable_table(results, dataset),
         "runs": runs_table(results),
+        **_filled({"angle_errors": angle_table(results, dataset), "reasons": reasons_table(results)}),
         "error_kinds": error_kinds_table(results, dataset),
         "misclassified": misclassified_table(results, dataset),
     }
+
+
+def _filled(tables: Mapping[str, Table]) -> dict[str, Table]:
+    """Leave out the tables of what only rules say, where there is none."""
+    return {name: table for name, table in tables.items() if table.rows}
 
 
 def dataset_tables(dataset: PreparedDataset) -> dict[str, Table]:
@@ -93,7 +100,7 @@ def runs_table(results: ComparisonResults) -> Table:
     """Every run that was asked for: what it trained on, how long, and the epoch it chose."""
     found = {(run.network, run.fold): run for run in results.runs}
     rows = []
-    for network in results.comparison.networks:
+    for network in results.comparison.methods:
         for fold in range(results.comparison.folds):
             run = found.get((network, fold))
             if run is None:

@@ -51,6 +51,7 @@ class Rule(ABC):
     name: ClassVar[str]
     source: ClassVar[str]  # whose method it reconstructs
     needs_image: ClassVar[bool] = False  # takes organized (H, W, 3) clouds only
+    parameters: Parameters
 
     @abstractmethod
     def __call__(self, cloud: Points) -> Answer:

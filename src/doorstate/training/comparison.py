@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One comparison: every network on every fold of one split, all runs of one experiment file."""
+"""One comparison: every network and rule on every fold of one split, all runs of one experiment file."""
 
 from __future__ import annotations
 
@@ -16,8 +16,10 @@ from doorstate.dataset.store import PreparedDataset, open_dataset
 from doorstate.errors import ConfigError, RunError
 from doorstate.jobs import Progress, default_workers, no_progress, run_pieces
 from doorstate.networks import create_network, list_networks
+from doorstate.rules import create_rule
 from doorstate.training.fit import RunConfig, fit, threads
 from doorstate.training.recipes import Recipe, find_recipe
+from doorstate.training.rule_run import RuleRunConfig, answer
 from doorstate.training.run_folder import RunFolder, read_json, write_json
 
 
@@ -30,6 +32,7 @@ class Experiment(BaseModel):
     dataset: str
     protocol: str = "paper"
     networks: tuple[str, ...] = Field(default_factory=lambda: tuple(list_networks()))
+    rules: tuple[str, ...] = ()  # answered beside the networks; nothing is trained
     folds: int = Field(default=NUM_FOLDS, ge=1, le=NUM_FOLDS)  # how many of the five are run
     num_points: int = Field(default=NUM_POINTS, ge=128)
     seed: int = 0
@@ -53,6 +56,11 @@ class Experiment(BaseModel):
         except ValidationError as error:
             raise ConfigError(f"experiment {self.name}: recipe_changes: {_first(error)}") from error
 
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """Networks and rules."""
+        return self.networks + self.rules
+
     def check(self) -> None:
         """Raise ConfigError for a name that does not exist, before anything is trained."""
         if self.protocol not in PROTOCOLS:
@@ -64,10 +72,12 @@ class Experiment(BaseModel):
         for network in self.networks:
             create_network(network)
             self.recipe_of(network)
+        for rule in self.rules:
+            create_rule(rule)
 
 
 class Run(NamedTuple):
-    """One network on one fold, and where it lies."""
+    """One network or rule on one fold, and where it lies."""
 
     network: str
     fold: int
@@ -116,7 +126,7 @@ def runs_of(experiment: Experiment, folder: Path) -> list[Run]:
     return [
         Run(network, fold, run_of(folder, network, fold))
         for fold in range(experiment.folds)
-        for network in experiment.networks
+        for network in experiment.methods
     ]
 
 
@@ -128,7 +138,7 @@ def run_of(folder: Path, network: str, fold: int) -> RunFolder:
 def compare(
     experiment: Experiment, folder: Path, jobs: int = 1, progress: Progress = no_progress
 ) -> list[dict[str, Any]]:
-    """Train and test every network on every fold; finished runs are kept, begun ones continued.
+    """Train and test every network, and ask every rule, on every fold; finished runs are kept, begun ones continued.
 
     Args:
         experiment: what to run.
@@ -158,7 +168,7 @@ def prepare_comparison(experiment: Experiment, folder: Path) -> None:
         | {network: experiment.recipe_of(network).model_dump(mode="json") for network in experiment.networks}
     }
     if path.is_file():
-        found = read_json(path)
+        found = {"rules": []} | read_json(path)  # a folder may be older than rules
         changed = sorted(key for key in {*found, *settings} if found.get(key) != settings.get(key))
         if changed:
             raise RunError(
@@ -198,12 +208,25 @@ def train_one(
     return fit(config, dataset, splits[fold], folder)
 
 
+def answer_one(
+    experiment: Experiment, folder: Path, dataset: PreparedDataset, rule: str, fold: int, splits_path: Path
+) -> dict[str, Any]:
+    """Ask one rule of an experiment for one fold."""
+    config = RuleRunConfig(
+        rule=rule,
+        parameters=create_rule(rule).parameters.model_dump(mode="json"),
+        dataset=experiment.dataset,
+        protocol=experiment.protocol,
+        fold=fold,
+    )
+    return answer(config, dataset, read_splits(splits_path)[fold], folder)
+
+
 def _run_piece(piece: _Piece, path: Path) -> None:
+    run = answer_one if piece.network in piece.experiment.rules else train_one
     with threads(piece.threads):
         dataset = open_dataset(Path(piece.experiment.dataset))
-        train_one(
-            piece.experiment, path.parent, dataset, piece.network, piece.fold, piece.folder / "splits.csv"
-        )
+        run(piece.experiment, path.parent, dataset, piece.network, piece.fold, piece.folder / "splits.csv")
 
 
 def _first(error: ValidationError) -> str:

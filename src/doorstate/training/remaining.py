@@ -30,7 +30,7 @@ def seconds_left(runs: Sequence[Run], recipes: Mapping[str, Recipe], num_points:
         return None
     left = 0.0
     for run in runs:
-        if run.folder.finished:
+        if run.folder.finished or run.network not in recipes:  # rules take seconds
             continue
         recipe, done = recipes[run.network], run.folder.read_position()
         # Another network's epochs are a better guess than none.

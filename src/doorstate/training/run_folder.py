@@ -29,6 +29,7 @@ class RunFolder:
         self.weights = path / "weights.safetensors"
         self.predictions = path / "predictions.csv"
         self.validation = path / "validation.csv"  # the same of the samples that the epoch was chosen on
+        self.found = path / "found.jsonl"  # what a rule found in samples that it did not get right
         self.metrics = path / "metrics.json"
 
     @property
