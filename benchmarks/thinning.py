@@ -60,4 +60,5 @@ def thinning_table(rows: Sequence[Group]) -> Table:
 
 
 def _told(answer: Prediction) -> Group:
-    return {"state": answer.state.label, "probabilities": answer.probabilities}
+    state = None if answer.state is None else answer.state.label
+    return {"state": state, "probabilities": answer.probabilities}

@@ -147,8 +147,12 @@ def check() -> str | None:
 
 
 def _comparisons() -> Iterator[Path]:
+    """Folders of published comparisons whose runs are all there; others are still being trained."""
+    from results_page import unfinished_runs
+
     for path in sorted(RESULTS.glob("*/comparison.json")):
-        yield path.parent
+        if not unfinished_runs(path.parent):
+            yield path.parent
 
 
 def _doorstate(arguments: str) -> None:

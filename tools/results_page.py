@@ -19,6 +19,8 @@ from doorstate.evaluation.score_tables import pooled_confusion
 from doorstate.evaluation.table import UNDEFINED, Table, number
 from doorstate.evaluation.tables import build_tables
 from doorstate.files import write_text
+from doorstate.training.comparison import run_of
+from doorstate.training.run_folder import read_json
 from doorstate.types import STATES
 
 BENCHMARK = Path(__file__).resolve().parents[1] / "docs" / "benchmarks" / "networks.json"
@@ -39,10 +41,6 @@ class Published:
     tables: dict[str, Table]
     scores: dict[str, Scores]  # pooled, by network
     confusion: dict[str, np.ndarray]
-
-    @property
-    def complete(self) -> bool:
-        return not self.results.missing
 
     def macro_f1(self, network: str) -> float:
         return float(self.scores[network].macro.f1)
@@ -79,10 +77,9 @@ def write_page(results_folder: Path, rows_folder: Path, page: Path) -> None:
         page: the file to write.
     """
     dataset = open_dataset(rows_folder)
-    published = {
-        path.parent.name: _published(path.parent, dataset)
-        for path in sorted(results_folder.glob("*/comparison.json"))
-    }
+    folders = [path.parent for path in sorted(results_folder.glob("*/comparison.json"))]
+    waiting = {folder.name: unfinished_runs(folder) for folder in folders}
+    published = {folder.name: _published(folder, dataset) for folder in folders if not waiting[folder.name]}
     resolution = results_folder / "resolution"
     environment = Environment(
         loader=FileSystemLoader(Path(__file__).parent),
@@ -93,6 +90,7 @@ def write_page(results_folder: Path, rows_folder: Path, page: Path) -> None:
     )
     text = environment.get_template("results.md.j2").render(
         published=published,
+        waiting={name: runs for name, runs in waiting.items() if runs},
         names=NAMES,
         states=STATES,
         budget=_table(budget_table(list(published.values()))),
@@ -103,6 +101,17 @@ def write_page(results_folder: Path, rows_folder: Path, page: Path) -> None:
         percent=lambda value, digits=2: f"{100 * value:.{digits}f} %",
     )
     write_text(page, text)
+
+
+def unfinished_runs(folder: Path) -> list[str]:
+    """Runs of a published comparison that are not there yet, as `network fold k`."""
+    asked = read_json(folder / "comparison.json")
+    return [
+        f"{network} fold {fold}"
+        for fold in range(asked["folds"])
+        for network in (*asked["networks"], *asked.get("rules", ()))
+        if not run_of(folder, network, fold).finished
+    ]
 
 
 def budget_table(published: list[Published]) -> Table:

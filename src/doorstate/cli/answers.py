@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from doorstate.cli.options import DepthScale, Focal, Frame, IntrinsicsFile, Roll, Units, read_options
-from doorstate.errors import DoorstateError
+from doorstate.errors import ConfigError, DoorstateError
 
 if TYPE_CHECKING:
     from doorstate.clouds.io import ReadOptions
@@ -21,6 +21,9 @@ def predict(
     network: Annotated[str, typer.Option(help="Network whose packaged weights to use.")] = "pointnet2",
     weights: Annotated[
         Path | None, typer.Option(help="A weights file of your own, in place of --network.")
+    ] = None,
+    rule: Annotated[
+        str | None, typer.Option(help="Answer by this rule instead of a network: doorstate info lists them.")
     ] = None,
     points: Annotated[
         int | None, typer.Option(help="Points to look at; as trained if not given.", min=128)
@@ -42,19 +45,23 @@ def predict(
     Examples:
       doorstate predict cloud.pcd
       doorstate predict --frame optical --json recordings/
+      doorstate predict --rule plane_state cloud.pcd
       doorstate predict depth.png --fx 385.9 --fy 385.4 --cx 317.8 --cy 243.7
       doorstate predict depth.png --intrinsics camera_info.yaml --roll 90
     """
     from doorstate.clouds.io import find_clouds
     from doorstate.console import err, print_table, progress_bar
     from doorstate.deployment.predictor import Predictor
+    from doorstate.deployment.rule_predictor import RulePredictor
     from doorstate.training.environment import keep_freed_memory
     from doorstate.types import STATES
 
     options = read_options(frame, roll, units, depth_scale, intrinsics, (fx, fy, cx, cy))
     found = find_clouds(files)
     keep_freed_memory()
-    predictor = Predictor.load(weights or network, points)
+    if rule is not None and (weights is not None or points is not None):
+        raise ConfigError("--rule has no weights and looks at all points: leave --weights and --points out")
+    predictor = Predictor.load(weights or network, points) if rule is None else RulePredictor.load(rule)
     predictor.warm_up()
     rows: list[list[str]] = []
     failures = 0
@@ -68,7 +75,8 @@ def predict(
                 err.print(f"{answer['file']}: {answer['error']}", style="red", markup=False, soft_wrap=True)
             else:
                 odds = answer["probabilities"]
-                shown = [answer["file"], answer["state"], *(f"{odds[state]:.3f}" for state in STATES)]
+                said = answer["state"] or f"none: {answer['reason']}"
+                shown = [answer["file"], said, *(f"{odds[state]:.3f}" for state in STATES)]
                 rows.append([*shown, str(answer["points"]), f"{answer['milliseconds']:.0f}"])
             progress(number + 1, len(found))
     if rows:
@@ -117,8 +125,14 @@ def _answer(predictor: Any, path: Path, options: ReadOptions) -> dict[str, Any]:
         return {"file": str(path), "error": reason.removeprefix(f"{path.name}: ")}
     return {
         "file": str(path),
-        "state": prediction.state.label,
+        "state": None if prediction.state is None else prediction.state.label,
         "probabilities": {state: round(p, 6) for state, p in prediction.probabilities.items()},
         "points": prediction.points,
         "milliseconds": round(prediction.milliseconds, 3),
+        **({"reason": prediction.reason} if prediction.state is None else {}),
+        **(
+            {}
+            if prediction.opening_angle_deg is None
+            else {"opening_angle_deg": round(prediction.opening_angle_deg, 1)}
+        ),
     }

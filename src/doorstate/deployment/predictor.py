@@ -23,12 +23,14 @@ DEFAULT_NETWORK = "pointnet2"
 
 @dataclass(frozen=True)
 class Prediction:
-    """What a network says of one cloud."""
+    """What a network or a rule says of one cloud."""
 
-    state: DoorState
+    state: DoorState | None  # None: no answer, for a reason
     probabilities: dict[str, float]  # by state
-    points: int  # how many points the network saw
+    points: int  # how many points were looked at
     milliseconds: float  # from raw points to this answer
+    reason: str = ""  # why there is no answer
+    opening_angle_deg: float | None = None  # where the method tells it
 
 
 class Predictor:

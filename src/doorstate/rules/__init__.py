@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from doorstate.errors import ConfigError
 from doorstate.rules.angle_bins import AngleBinsRule
 from doorstate.rules.base import Rule
@@ -11,7 +13,7 @@ from doorstate.rules.open_door import OpenDoorRule
 from doorstate.rules.plane_state import PlaneStateRule
 from doorstate.rules.wall_leaf_angle import WallLeafAngleRule
 
-RULES: dict[str, type[Rule]] = {
+RULES: dict[str, type[Rule[Any]]] = {
     rule.name: rule
     for rule in (OpenDoorRule, PlaneStateRule, WallLeafAngleRule, AngleBinsRule, DepthRegionRule)
 }
@@ -22,7 +24,7 @@ def list_rules() -> list[str]:
     return list(RULES)
 
 
-def create_rule(name: str) -> Rule:
+def create_rule(name: str) -> Rule[Any]:
     """A rule with its default parameters.
 
     Raises:

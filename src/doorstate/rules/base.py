@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import ClassVar, Generic, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,13 +45,23 @@ class Parameters(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
-class Rule(ABC):
-    """One method. Deterministic: the same cloud gives the same answer."""
+P = TypeVar("P", bound=Parameters)
+
+
+class Rule(ABC, Generic[P]):
+    """One method. Deterministic: the same cloud gives the same answer.
+
+    Args:
+        parameters: of the rule; its defaults if not given.
+    """
 
     name: ClassVar[str]
     source: ClassVar[str]  # whose method it reconstructs
     needs_image: ClassVar[bool] = False  # takes organized (H, W, 3) clouds only
-    parameters: Parameters
+    defaults: ClassVar[type[Parameters]]
+
+    def __init__(self, parameters: P | None = None) -> None:
+        self.parameters: P = parameters or cast(P, self.defaults())
 
     @abstractmethod
     def __call__(self, cloud: Points) -> Answer:

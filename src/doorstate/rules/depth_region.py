@@ -29,7 +29,7 @@ class DepthRegionParameters(Parameters):
     min_measured_share: float = 0.3  # of the pixels; chosen: stereo cameras indoors measure half and more
 
 
-class DepthRegionRule(Rule):
+class DepthRegionRule(Rule[DepthRegionParameters]):
     """Strips of the robot's lane are blocked, free, or unknown: all blocked is closed, all free open, some semi-open.
 
     A strip is free only where its floor was measured beyond the reach, so that missing readings make it unknown, and
@@ -38,9 +38,7 @@ class DepthRegionRule(Rule):
 
     name: ClassVar[str] = "depth_region"
     source: ClassVar[str] = "plain baseline: RoboCup@Home start doors"
-
-    def __init__(self, parameters: DepthRegionParameters | None = None) -> None:
-        self.parameters = parameters or DepthRegionParameters()
+    defaults: ClassVar[type[Parameters]] = DepthRegionParameters
 
     def __call__(self, cloud: Points) -> Answer:
         p = self.parameters

@@ -77,19 +77,16 @@ class _Side:
     seen: bool  # False: nothing but the edge itself stands there, as of a leaf seen edge-on
 
 
-class OpenDoorRule(Rule):
+class OpenDoorRule(Rule[OpenDoorParameters]):
     """Open or not open, from an organized cloud.
 
     Source: Kaleci & Turgut 2020, reconstructed from what is known of it.
     """
 
+    defaults = OpenDoorParameters
     name = "open_door"
     source = "Kaleci & Turgut 2020 (a reconstruction from what is known, not the authors' code)"
     needs_image = True
-    parameters: OpenDoorParameters
-
-    def __init__(self, parameters: OpenDoorParameters | None = None) -> None:
-        self.parameters = parameters or OpenDoorParameters()
 
     def __call__(self, cloud: Points) -> Answer:
         if cloud.ndim != 3:

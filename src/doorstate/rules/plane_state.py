@@ -8,9 +8,9 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from doorstate.rules.angle_bins import WallParameters, covered_m, every_other, outline, wall_alone
 from doorstate.rules.base import Answer, Parameters, Rule, measured
 from doorstate.rules.planes import Floats, Plane, angle_deg, fit_plane, normals, pieces, thin
+from doorstate.rules.walls import WallParameters, covered_m, every_other, outline, wall_alone
 from doorstate.types import DoorState, Points
 
 
@@ -67,18 +67,16 @@ class _Pair(NamedTuple):
     wall_m: float
 
 
-class PlaneStateRule(Rule):
+class PlaneStateRule(Rule[PlaneStateParameters]):
     """Upright planes by their normals; the one of a door's size that hangs on another by one end is the leaf.
 
     The angle is told on both sides of perpendicular by where the wall goes on beside the hinge. Without a leaf:
-    `angle_bins.wall_alone`.
+    `walls.wall_alone`.
     """
 
     name: ClassVar[str] = "plane_state"
     source: ClassVar[str] = "Rusu et al. 2009"
-
-    def __init__(self, parameters: PlaneStateParameters | None = None) -> None:
-        self.parameters = parameters or PlaneStateParameters()
+    defaults: ClassVar[type[Parameters]] = PlaneStateParameters
 
     def __call__(self, cloud: Points) -> Answer:
         p = self.parameters

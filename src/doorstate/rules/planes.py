@@ -98,7 +98,9 @@ def fit_plane(
 
 
 def thin(points: Floats, voxel_m: float) -> Floats:
-    """The mean point of every occupied voxel (PCL's VoxelGrid)."""
+    """The mean point of every occupied voxel (PCL's VoxelGrid); cut far points off first, voxels are counted."""
+    if len(points) == 0:
+        return points
     cells = np.floor((points - points.min(axis=0)) / voxel_m).astype(np.int64)
     keys = np.ravel_multi_index(tuple(cells.T), tuple(cells.max(axis=0) + 1))
     _, voxel, counts = np.unique(keys, return_inverse=True, return_counts=True)

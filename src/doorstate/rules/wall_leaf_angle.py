@@ -87,20 +87,17 @@ class _Leaf:
     closing: float  # +1 or -1: which way along the wall it closes
 
 
-class WallLeafAngleRule(Rule):
+class WallLeafAngleRule(Rule[WallLeafAngleParameters]):
     """Three states and the opening angle, from flat or organized clouds.
 
     Source: Ning et al. 2023, Quintana et al. 2018, reconstructed from what is known of them.
     """
 
+    defaults = WallLeafAngleParameters
     name = "wall_leaf_angle"
     source = (
         "Ning et al. 2023, Quintana et al. 2018 (a reconstruction from what is known, not the authors' code)"
     )
-    parameters: WallLeafAngleParameters
-
-    def __init__(self, parameters: WallLeafAngleParameters | None = None) -> None:
-        self.parameters = parameters or WallLeafAngleParameters()
 
     def __call__(self, cloud: Points) -> Answer:
         if cloud.ndim == 3:

@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A rule behind the interface of a `Predictor`: no weights, no training, and no answer where it has none."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+
+from doorstate.deployment.predictor import Prediction
+from doorstate.errors import CloudContentError
+from doorstate.rules import create_rule
+from doorstate.rules.base import Rule, measured
+from doorstate.types import STATES, Points
+
+
+class RulePredictor:
+    """A rule of `doorstate.rules.list_rules()`."""
+
+    def __init__(self, rule: Rule[Any]) -> None:
+        self.rule = rule
+
+    @classmethod
+    def load(cls, name: str) -> RulePredictor:
+        """A rule by name, with its default parameters.
+
+        Raises:
+            ConfigError: no such rule.
+        """
+        return cls(create_rule(name))
+
+    def __call__(self, points: Points) -> Prediction:
+        """State of the door in a cloud, or none with the reason; a given state has probability 1.
+
+        Args:
+            points: (N, 3) or organized (H, W, 3) metres, x forward, y left, z up, NaN where nothing was measured.
+
+        Raises:
+            CloudContentError: nothing was measured.
+        """
+        started = time.perf_counter()
+        count = len(measured(points))
+        if count == 0:
+            raise CloudContentError("nothing was measured: the cloud holds no points")
+        answer = self.rule(np.asarray(points))
+        return Prediction(
+            answer.state,
+            {state: float(answer.state is not None and answer.state.label == state) for state in STATES},
+            count,
+            (time.perf_counter() - started) * 1000,
+            answer.reason,
+            answer.opening_angle_deg,
+        )
+
+    def warm_up(self) -> None:
+        """Nothing to load."""
