@@ -106,6 +106,23 @@ def test_predict_prints_a_table(run: Run, weights: Path, cloud: np.ndarray, tmp_
     assert err == ""
 
 
+def test_predict_by_a_rule_needs_no_weights_and_may_say_why_not(
+    run: Run, simulated_folder: Path, tmp_path: Path
+) -> None:
+    cloud = sorted((simulated_folder / "pcd" / "closed").glob("*.pcd"))[0]
+    code, out, err = run("predict", "--rule", "plane_state", "--json", cloud)
+    assert code == 0, err
+    answer = json.loads(out)
+    assert (answer["state"] is None) == ("reason" in answer)
+    code, out, _ = run("predict", "--rule", "open_door", cloud)
+    assert code == 0
+    assert "none: " in out, "this rule tells open doors only, from images only"
+    code, _, err = run("predict", "--rule", "open_door", "--points", 128, cloud)
+    assert code == 1
+    assert "leave --weights and --points out" in err
+    assert run("predict", "--rule", "nonsense", cloud)[0] == 1
+
+
 def test_predict_json_is_one_object_a_line(
     run: Run, weights: Path, cloud: np.ndarray, tmp_path: Path
 ) -> None:

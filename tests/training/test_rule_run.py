@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Runs of rules: the same files as a network's, with reasons and angles, and whatever was found where they erred."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from sklearn.metrics import f1_score
+
+from doorstate.dataset.prepare import prepare_dataset
+from doorstate.dataset.splits import Role
+from doorstate.dataset.store import PreparedDataset
+from doorstate.errors import ConfigError, DatasetError
+from doorstate.rules import create_rule, list_rules
+from doorstate.simulation.manifest import read_csv
+from doorstate.training.comparison import Experiment, compare
+from doorstate.training.rule_run import RuleRunConfig, answer
+from doorstate.types import NO_ANSWER, STATES
+
+
+@pytest.fixture(scope="module")
+def doors(simulated_folder: Path, tmp_path_factory: pytest.TempPathFactory) -> PreparedDataset:
+    folder = tmp_path_factory.mktemp("doors") / "clouds"
+    return prepare_dataset(simulated_folder, folder, 128, workers=1).dataset
+
+
+def config(rule: str) -> RuleRunConfig:
+    return RuleRunConfig(rule=rule, parameters={}, dataset="d", protocol="paper", fold=0)
+
+
+def test_answers_are_those_of_the_rule_on_raw_frames(doors: PreparedDataset, tmp_path: Path) -> None:
+    roles: dict[str, Role] = {row["sample_id"]: "test" for row in doors.rows[:9]}
+    metrics = answer(config("plane_state"), doors, roles, tmp_path)
+    rows = read_csv(tmp_path / "predictions.csv")
+    assert [row["sample_id"] for row in rows] == list(roles)
+    rule = create_rule("plane_state")
+    for row in rows:
+        expected = rule(doors.raw_cloud(doors.index_of(row["sample_id"])))
+        assert row["predicted"] == (NO_ANSWER if expected.state is None else expected.state.label)
+        assert row["reason"] == expected.reason
+        assert (row["opening_angle_deg"] == "") == (expected.opening_angle_deg is None)
+        assert sum(float(row[f"p_{state}"]) for state in STATES) == (expected.state is not None)
+    oracle = f1_score(
+        [row["state"] for row in rows],
+        [row["predicted"] for row in rows],
+        labels=STATES,
+        average="macro",
+        zero_division=0,
+    )
+    assert metrics["test_macro_f1"] == pytest.approx(oracle)
+    assert metrics["no_answer"] == sum(row["predicted"] == NO_ANSWER for row in rows)
+    missed = {row["sample_id"] for row in rows if row["predicted"] != row["state"]}
+    found = [json.loads(line) for line in (tmp_path / "found.jsonl").read_text().splitlines()]
+    assert {each["sample_id"] for each in found} == missed
+    for each in found:
+        for name, points in each["found"]:
+            assert name
+            assert np.shape(points)[1:] == (3,)
+
+
+def test_a_finished_run_is_not_asked_again_and_an_empty_one_refused(
+    doors: PreparedDataset, tmp_path: Path
+) -> None:
+    roles: dict[str, Role] = {doors.rows[0]["sample_id"]: "test"}
+    first = answer(config("depth_region"), doors, roles, tmp_path / "a")
+    assert answer(config("depth_region"), doors, {}, tmp_path / "a") == first
+    with pytest.raises(DatasetError, match="no sample is tested in fold 0"):
+        answer(config("depth_region"), doors, {}, tmp_path / "b")
+
+
+def test_rules_stand_beside_networks_in_a_comparison(doors: PreparedDataset, tmp_path: Path) -> None:
+    experiment = Experiment(
+        name="both",
+        dataset=str(doors.folder),
+        networks=("pointnet",),
+        rules=("angle_bins", "wall_leaf_angle"),
+        folds=1,
+        num_points=128,
+        recipe_changes={"epochs": 1, "batch_size": 8, "precision": "fp32"},
+    )
+    found = compare(experiment, tmp_path / "c")
+    assert [run["network"] for run in found] == ["pointnet", "angle_bins", "wall_leaf_angle"]
+    with pytest.raises(ConfigError, match="there is no rule 'angle'"):
+        experiment.model_copy(update={"rules": ("angle",)}).check()
+
+
+def test_every_rule_has_a_source_and_parameters_with_defaults() -> None:
+    for name in list_rules():
+        rule = create_rule(name)
+        assert (rule.name, bool(rule.source)) == (name, True)
+        assert type(rule.parameters) is rule.defaults
