@@ -71,7 +71,7 @@ class MVCNN(PointNetwork):
     def features(self, points: Tensor, neighbourhoods: Neighbourhoods | None = None) -> Tensor:
         """(B, 256) maximum over the views."""
         images = self.render(points)
-        features: Tensor = self.cnn(images.flatten(0, 1))
+        features: Tensor = self.cnn(images.flatten(0, 1).contiguous(memory_format=torch.channels_last))
         return features.reshape(*images.shape[:2], self.feature_size).amax(dim=1)
 
 
