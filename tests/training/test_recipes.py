@@ -109,6 +109,13 @@ def test_coarse_to_fine_ends_on_all_points() -> None:
     assert resolution_of_epoch(recipe, 5, 512).points == 512, "never more points than the run has"
 
 
+@pytest.mark.parametrize("epochs", [1, 2, 5])
+def test_even_a_short_training_ends_on_all_points(epochs: int) -> None:
+    recipe = Recipe(name="x", epochs=epochs, coarse_to_fine=(Stage(share=0.95, points=256),))
+    points = [resolution_of_epoch(recipe, epoch, 4096).points for epoch in range(epochs)]
+    assert points == [256] * (epochs - 1) + [4096]
+
+
 def test_the_last_stage_has_all_centres() -> None:
     recipe = Recipe(name="x", epochs=4, coarse_to_fine=(Stage(share=0.5, points=4096, centres=0.25),))
     assert [resolution_of_epoch(recipe, epoch, 4096).centres for epoch in range(4)] == [0.25, 0.25, 1, 1]

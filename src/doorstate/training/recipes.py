@@ -221,7 +221,7 @@ def _steps(recipe: Recipe, iteration: int, iterations_per_epoch: int) -> int:
 
 
 def resolution_of_epoch(recipe: Recipe, epoch: int, num_points: int) -> Resolution:
-    """How much of each cloud an epoch (from 0) looks at.
+    """How much of each cloud an epoch (from 0) looks at; the last one always at everything.
 
     Raises:
         ConfigError: the shares of the stages leave nothing for all points.
@@ -229,7 +229,7 @@ def resolution_of_epoch(recipe: Recipe, epoch: int, num_points: int) -> Resoluti
     end = 0.0
     for stage in recipe.coarse_to_fine:
         end += stage.share
-        if epoch < round(end * recipe.epochs):
+        if epoch < min(round(end * recipe.epochs), recipe.epochs - 1):
             return Resolution(min(stage.points, num_points), stage.centres)
     if end >= 1:
         raise ConfigError(
