@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The state of a door from one depth-camera point cloud.
 
-The public names are `Predictor`, `Prediction`, `DoorState`, `read_cloud`, `create_network` and `list_networks`; each is
-imported when it is first used, so that `import doorstate` and the command line's help stay quick.
+The public names are `Predictor`, `Prediction`, `Gate`, `StateFilter`, `wait_for`, `DoorState`, `read_cloud`,
+`create_network` and `list_networks`; each is imported when it is first used, so that `import doorstate` and the
+command line's help stay quick.
 """
 
 from __future__ import annotations
@@ -12,20 +13,35 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from doorstate.clouds.io import read_cloud
+    from doorstate.deployment.gate import Gate
     from doorstate.deployment.predictor import Prediction, Predictor
+    from doorstate.deployment.stream import StateFilter, wait_for
     from doorstate.networks import create_network, list_networks
     from doorstate.types import DoorState
 
 __version__ = "0.1.0"
-__all__ = ["DoorState", "Prediction", "Predictor", "create_network", "list_networks", "read_cloud"]
+__all__ = [
+    "DoorState",
+    "Gate",
+    "Prediction",
+    "Predictor",
+    "StateFilter",
+    "create_network",
+    "list_networks",
+    "read_cloud",
+    "wait_for",
+]
 
 _HOME = {
     "DoorState": "doorstate.types",
+    "Gate": "doorstate.deployment.gate",
     "Prediction": "doorstate.deployment.predictor",
     "Predictor": "doorstate.deployment.predictor",
+    "StateFilter": "doorstate.deployment.stream",
     "create_network": "doorstate.networks",
     "list_networks": "doorstate.networks",
     "read_cloud": "doorstate.clouds.io",
+    "wait_for": "doorstate.deployment.stream",
 }
 
 

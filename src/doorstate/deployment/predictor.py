@@ -3,22 +3,29 @@
 
 from __future__ import annotations
 
+import statistics
 import time
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 
-from doorstate.clouds.preparation import NUM_POINTS, normalize, prepare_cloud
-from doorstate.errors import WeightsError
+from doorstate.clouds.preparation import NUM_POINTS, PreparedCloud, normalize, prepare_cloud
+from doorstate.deployment.gate import Gate
+from doorstate.errors import ConfigError, WeightsError
 from doorstate.networks import list_networks
 from doorstate.networks.base import PointNetwork
 from doorstate.training.weights import WeightsCard, load_weights
 from doorstate.types import STATES, DoorState, Points
 
 DEFAULT_NETWORK = "pointnet2"
+DEFAULT_GATE = Gate()
+BUDGET_POINTS = (256, 512, 1024, 2048, 4096)  # what a time budget is spent on
+_BUDGET_REPEATS = 5  # of each, after one that warms up
 
 
 @dataclass(frozen=True)
@@ -36,25 +43,45 @@ class Prediction:
 class Predictor:
     """A network with its weights, and the preparation they were trained with.
 
+    Nothing in it changes after it is made, so any number of threads may call one predictor.
+
     Args:
         network: classifier.
         card: of its weights.
         points: how many points to look at.
         thin: sample the points from some rows and columns of an organized cloud, which is several times quicker,
             and not from all as in training (clouds.preparation).
+        gate: refuses clouds in which too much is missing, with a reason and no state; None refuses nothing.
+        clock: seconds that pass, for `milliseconds` and time budgets.
     """
 
     def __init__(
-        self, network: PointNetwork, card: WeightsCard, points: int = NUM_POINTS, *, thin: bool = True
+        self,
+        network: PointNetwork,
+        card: WeightsCard,
+        points: int = NUM_POINTS,
+        *,
+        thin: bool = True,
+        gate: Gate | None = DEFAULT_GATE,
+        clock: Callable[[], float] = time.perf_counter,
     ) -> None:
         self.network = network.eval()
         self.card = card
         self.points = points
         self.thin = thin
+        self.gate = gate
+        self.clock = clock
 
     @classmethod
     def load(
-        cls, name_or_path: str | Path = DEFAULT_NETWORK, points: int | None = None, *, thin: bool = True
+        cls,
+        name_or_path: str | Path = DEFAULT_NETWORK,
+        points: int | None = None,
+        *,
+        thin: bool = True,
+        gate: Gate | None = DEFAULT_GATE,
+        budget_ms: float | None = None,
+        clock: Callable[[], float] = time.perf_counter,
     ) -> Predictor:
         """Load packaged weights by network name, or any weights file by path.
 
@@ -62,18 +89,41 @@ class Predictor:
             name_or_path: a name of `packaged_networks()`, or a `.safetensors` file.
             points: how many points to look at; None takes as many as the weights were trained with.
             thin: as of the class.
+            gate: as of the class.
+            budget_ms: in place of `points`: the most of `BUDGET_POINTS` that this machine, measured now, takes no more
+                time for, from a raw 640 x 480 cloud to an answer; the fewest if all take more, and never more
+                than the weights were trained with.
+            clock: as of the class.
 
         Raises:
             WeightsError: no such weights, or they cannot be used.
+            ConfigError: both points and a budget, or a budget that is no time.
         """
+        if budget_ms is not None and (points is not None or not budget_ms > 0):
+            raise ConfigError(
+                f"a budget of {budget_ms} ms with {points} points: give one of them, above zero"
+            )
         path = Path(name_or_path)
         if path.suffix != ".safetensors":
             path = packaged_weights(str(name_or_path))
         network, card = load_weights(path)
-        return cls(network, card, points or card.num_points, thin=thin)
+
+        def looking_at(count: int) -> Predictor:
+            return cls(network, card, count, thin=thin, gate=gate, clock=clock)
+
+        if budget_ms is None:
+            return looking_at(points or card.num_points)
+        counts = [count for count in BUDGET_POINTS if count <= card.num_points] or [card.num_points]
+        chosen = looking_at(counts[0])
+        for count in counts[1:]:
+            larger = looking_at(count)
+            if _typical_milliseconds(larger) > budget_ms:
+                break
+            chosen = larger
+        return chosen
 
     def __call__(self, points: Points) -> Prediction:
-        """State of the door in a cloud.
+        """State of the door in a cloud, or none with the gate's reason.
 
         Args:
             points: (N, 3) or organized (H, W, 3) metres, x forward, y left, z up, NaN where nothing was measured.
@@ -81,22 +131,63 @@ class Predictor:
         Raises:
             CloudContentError: the cloud cannot be used (clouds.preparation says when).
         """
-        started = time.perf_counter()
-        prepared = prepare_cloud(points, self.points, thin=self.thin)
+        return self.batch([points])[0]
+
+    def batch(self, clouds: Sequence[Points]) -> list[Prediction]:
+        """States of the doors in several clouds; those with equally many points go through the network at once.
+
+        Args:
+            clouds: each as for a call; they may differ in form and size.
+
+        Returns:
+            One prediction for each, in their order; its milliseconds are an equal share of the time for all.
+
+        Raises:
+            CloudContentError: one of the clouds cannot be used.
+        """
+        started = self.clock()
+        prepared = [prepare_cloud(cloud, self.points, thin=self.thin) for cloud in clouds]
+        reasons = [None if self.gate is None else self.gate(cloud) for cloud in clouds]
+        asked = [number for number, reason in enumerate(reasons) if reason is None]
+        probabilities = np.zeros((len(clouds), len(STATES)), dtype=np.float32)
+        for count in sorted({len(prepared[number].points) for number in asked}):
+            alike = [number for number in asked if len(prepared[number].points) == count]
+            probabilities[alike] = self._probabilities([prepared[number] for number in alike])
+        milliseconds = (self.clock() - started) * 1000 / max(1, len(clouds))
+        return [
+            Prediction(
+                DoorState(int(each.argmax())) if reason is None else None,
+                {state: float(p) for state, p in zip(STATES, each, strict=True)},
+                len(cloud.points),
+                milliseconds,
+                reason or "",
+            )
+            for cloud, each, reason in zip(prepared, probabilities, reasons, strict=True)
+        ]
+
+    def _probabilities(self, prepared: list[PreparedCloud]) -> NDArray[np.float32]:
+        """(B, 3) of clouds with equally many points."""
+        normalized = normalize(np.stack([cloud.points for cloud in prepared]))
         with torch.inference_mode():
-            logits = self.network(torch.from_numpy(normalize(prepared.points))[None])
-            probabilities = (logits / self.card.temperature).softmax(1)[0].numpy()
-        milliseconds = (time.perf_counter() - started) * 1000
-        return Prediction(
-            DoorState(int(probabilities.argmax())),
-            {state: float(p) for state, p in zip(STATES, probabilities, strict=True)},
-            len(prepared.points),
-            milliseconds,
-        )
+            logits = self.network(torch.from_numpy(normalized))
+            calibrated: NDArray[np.float32] = (logits / self.card.temperature).softmax(1).numpy()
+        return calibrated
 
     def warm_up(self) -> None:
         """Run once on noise, so that the first real cloud is as quick as the others."""
-        self(np.random.default_rng(0).normal(2.0, 1.0, (self.points, 3)).astype(np.float32))
+        cloud = np.random.default_rng(0).normal(2.0, 1.0, (self.points, 3)).astype(np.float32)
+        self._probabilities([prepare_cloud(cloud, self.points)])
+
+
+def _typical_milliseconds(predictor: Predictor) -> float:
+    """Median time for a wall 3 m away and the floor before it, as a camera 1 m above the floor sees them."""
+    across, up = np.meshgrid(
+        np.linspace(0.58, -0.58, 640), np.linspace(0.43, -0.43, 480)
+    )  # tangents, 60 degrees
+    depth_m = np.minimum(3.0, 1.0 / np.maximum(-up, 0.1))
+    scene = (depth_m[..., None] * np.stack((np.ones_like(up), across, up), axis=-1)).astype(np.float32)
+    predictor(scene)
+    return statistics.median(predictor(scene).milliseconds for _ in range(_BUDGET_REPEATS))
 
 
 def packaged_networks() -> list[str]:
