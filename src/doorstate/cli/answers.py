@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from doorstate.cli.options import DepthScale, Focal, Frame, IntrinsicsFile, Roll, Units, read_options
+from doorstate.cli.predictions import described, table_cells
 from doorstate.errors import ConfigError, DoorstateError
 
 if TYPE_CHECKING:
@@ -17,7 +18,9 @@ if TYPE_CHECKING:
 
 
 def predict(
-    files: Annotated[list[Path], typer.Argument(help="Clouds, depth images, or folders of them.")],
+    files: Annotated[
+        list[Path] | None, typer.Argument(help="Clouds, depth images, or folders of them.")
+    ] = None,
     network: Annotated[str, typer.Option(help="Network whose packaged weights to use.")] = "pointnet2",
     weights: Annotated[
         Path | None, typer.Option(help="A weights file of your own, in place of --network.")
@@ -29,6 +32,20 @@ def predict(
         int | None, typer.Option(help="Points to look at; as trained if not given.", min=128)
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object a line.")] = False,
+    bag: Annotated[
+        Path | None,
+        typer.Option(help="A ROS recording in place of files: .bag, .db3, .mcap, or ROS 2 folder."),
+    ] = None,
+    topic: Annotated[
+        str | None, typer.Option(help="PointCloud2 or depth image topic of the bag, if there are several.")
+    ] = None,
+    camera_info_topic: Annotated[
+        str | None, typer.Option(help="Camera of a depth image topic, if not camera_info beside it.")
+    ] = None,
+    every: Annotated[int, typer.Option(help="Answer every Nth message of the bag.", min=1)] = 1,
+    out: Annotated[
+        Path | None, typer.Option(help="Write the answers of the bag to this .csv or .jsonl file.")
+    ] = None,
     frame: Frame = "body",
     roll: Roll = 0,
     units: Units = "m",
@@ -39,7 +56,7 @@ def predict(
     cx: Focal = None,
     cy: Focal = None,
 ) -> None:
-    """Tell the state of the door in each file: .pcd .ply .npy .npz .xyz .csv, or depth .png with its camera.
+    """Tell the state of the door in each file (.pcd .ply .npy .npz .xyz .csv, depth .png) or message of a ROS bag.
 
     \b
     Examples:
@@ -48,42 +65,33 @@ def predict(
       doorstate predict --rule plane_state cloud.pcd
       doorstate predict depth.png --fx 385.9 --fy 385.4 --cx 317.8 --cy 243.7
       doorstate predict depth.png --intrinsics camera_info.yaml --roll 90
+      doorstate predict --bag run.bag --topic /camera/depth/points --frame optical --out run.csv
     """
+    from doorstate.cli.bags import predict_bag
     from doorstate.clouds.io import find_clouds
-    from doorstate.console import err, print_table, progress_bar
+    from doorstate.console import err
     from doorstate.deployment.predictor import Predictor
     from doorstate.deployment.rule_predictor import RulePredictor
     from doorstate.training.environment import keep_freed_memory
-    from doorstate.types import STATES
 
-    options = read_options(frame, roll, units, depth_scale, intrinsics, (fx, fy, cx, cy))
-    found = find_clouds(files)
-    keep_freed_memory()
+    if bool(files) == (bag is not None):
+        err.print("doorstate: give files, or a recording by --bag: one of the two")
+        raise typer.Exit(2)
+    if bag is None and (topic, camera_info_topic, every, out) != (None, None, 1, None):
+        raise ConfigError("--topic, --camera-info-topic, --every and --out are for --bag")
+    if out is not None and as_json:
+        raise ConfigError("--out writes JSON lines to a file that ends in .jsonl: leave --json out")
     if rule is not None and (weights is not None or points is not None):
         raise ConfigError("--rule has no weights and looks at all points: leave --weights and --points out")
+    options = read_options(frame, roll, units, depth_scale, intrinsics, (fx, fy, cx, cy))
+    found = find_clouds(files or [])
+    keep_freed_memory()
     predictor = Predictor.load(weights or network, points) if rule is None else RulePredictor.load(rule)
     predictor.warm_up()
-    rows: list[list[str]] = []
-    failures = 0
-    with progress_bar("Predicting") as progress:
-        for number, path in enumerate(found):
-            answer = _answer(predictor, path, options)
-            failures += "error" in answer
-            if as_json:
-                print(json.dumps(answer, ensure_ascii=False), flush=True)  # noqa: T201
-            elif "error" in answer:
-                err.print(f"{answer['file']}: {answer['error']}", style="red", markup=False, soft_wrap=True)
-            else:
-                odds = answer["probabilities"]
-                said = answer["state"] or f"none: {answer['reason']}"
-                shown = [answer["file"], said, *(f"{odds[state]:.3f}" for state in STATES)]
-                rows.append([*shown, str(answer["points"]), f"{answer['milliseconds']:.0f}"])
-            progress(number + 1, len(found))
-    if rows:
-        print_table("", ["file", "state", *STATES, "points", "ms"], rows)
-    if failures:
-        err.print(f"{failures} of {len(found)} files could not be answered")
-        raise typer.Exit(1)
+    if bag is None:
+        _predict_files(predictor, found, options, as_json)
+    else:
+        predict_bag(predictor, bag, options, topic, camera_info_topic, every, out, as_json)
 
 
 def info(as_json: Annotated[bool, typer.Option("--json", help="As one JSON object.")] = False) -> None:
@@ -115,24 +123,34 @@ def info(as_json: Annotated[bool, typer.Option("--json", help="As one JSON objec
     print_table("", ["network", "parameters", "weights in the package"], rows)
 
 
+def _predict_files(predictor: Any, paths: list[Path], options: ReadOptions, as_json: bool) -> None:
+    from doorstate.console import err, print_table, progress_bar
+    from doorstate.types import STATES
+
+    rows: list[list[str]] = []
+    failures = 0
+    with progress_bar("Predicting") as progress:
+        for number, path in enumerate(paths):
+            answer = _answer(predictor, path, options)
+            failures += "error" in answer
+            if as_json:
+                print(json.dumps(answer, ensure_ascii=False), flush=True)  # noqa: T201
+            elif "error" in answer:
+                err.print(f"{answer['file']}: {answer['error']}", style="red", markup=False, soft_wrap=True)
+            else:
+                rows.append([answer["file"], *table_cells(answer)])
+            progress(number + 1, len(paths))
+    if rows:
+        print_table("", ["file", "state", *STATES, "points", "ms"], rows)
+    if failures:
+        err.print(f"{failures} of {len(paths)} files could not be answered")
+        raise typer.Exit(1)
+
+
 def _answer(predictor: Any, path: Path, options: ReadOptions) -> dict[str, Any]:
     from doorstate.clouds.io import read_cloud
 
     try:
-        prediction = predictor(read_cloud(path, options))
+        return {"file": str(path)} | described(predictor(read_cloud(path, options)))
     except DoorstateError as error:
-        reason = str(error)
-        return {"file": str(path), "error": reason.removeprefix(f"{path.name}: ")}
-    return {
-        "file": str(path),
-        "state": None if prediction.state is None else prediction.state.label,
-        "probabilities": {state: round(p, 6) for state, p in prediction.probabilities.items()},
-        "points": prediction.points,
-        "milliseconds": round(prediction.milliseconds, 3),
-        **({"reason": prediction.reason} if prediction.state is None else {}),
-        **(
-            {}
-            if prediction.opening_angle_deg is None
-            else {"opening_angle_deg": round(prediction.opening_angle_deg, 1)}
-        ),
-    }
+        return {"file": str(path), "error": str(error).removeprefix(f"{path.name}: ")}
