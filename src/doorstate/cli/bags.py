@@ -45,9 +45,8 @@ def predict_bag(
         with _destination(out, as_json) as write, progress_bar("Predicting") as progress:
             for answer, frame_id in _answers(predictor, clouds):
                 if looks_optical and count == 0 and "optical" in frame_id:
-                    err.print(
-                        f"{chosen.name} is in the frame {frame_id}: is --frame optical missing?", markup=False
-                    )
+                    hint = f"{chosen.name} is in the frame {frame_id}: is --frame optical missing?"
+                    err.print(hint, markup=False, soft_wrap=True)
                 write(answer)
                 count += 1
                 failures += "error" in answer
