@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +14,7 @@ import torch
 from doorstate.clouds.preparation import normalize, prepare_cloud
 from doorstate.dataset.store import PreparedDataset
 from doorstate.deployment.predictor import Predictor, packaged_networks, packaged_weights
-from doorstate.errors import CloudContentError, WeightsError
+from doorstate.errors import CloudContentError, ConfigError, WeightsError
 from doorstate.networks import create_network
 from doorstate.simulation.generate import replay
 from doorstate.simulation.manifest import unflatten
@@ -80,6 +82,86 @@ def test_weights_load_by_path_and_by_name(tmp_path: Path) -> None:
     assert Predictor.load(path, points=512).points == 512
     with pytest.raises(WeightsError, match=r"no weights for 'nonet' in the package \(there are: .*pointnet2"):
         Predictor.load("nonet")
+
+
+def clock_of(milliseconds: list[float]) -> Callable[[], float]:
+    """A clock on which the n-th call of a predictor takes the n-th time."""
+    stamps = iter([stamp for each in milliseconds for stamp in (0.0, each / 1000)])
+    return lambda: next(stamps)
+
+
+@pytest.mark.parametrize(
+    ("budget_ms", "points"), [(100.0, 1024), (33.0, 1024), (29.9, 512), (20.0, 512), (19.0, 256), (0.1, 256)]
+)
+def test_a_budget_takes_the_most_points_it_has_time_for(
+    tmp_path: Path, budget_ms: float, points: int
+) -> None:
+    path = tmp_path / "mine.safetensors"
+    save_weights(path, create_network("pointnet"), WeightsCard(network="pointnet", num_points=1024))
+    # Of six calls one warms up, and of five times the median counts.
+    of_512, of_1024 = [500.0, 9.0, 20.0, 20.0, 20.0, 90.0], [500.0, 30.0, 30.0, 30.0, 7.0, 90.0]
+    predictor = Predictor.load(path, budget_ms=budget_ms, clock=clock_of(of_512 + of_1024))
+    assert predictor.points == points
+
+
+def test_a_budget_and_a_number_of_points_or_no_time_are_errors(tmp_path: Path) -> None:
+    path = tmp_path / "mine.safetensors"
+    save_weights(path, create_network("pointnet"), WeightsCard(network="pointnet", num_points=200))
+    assert Predictor.load(path, budget_ms=1.0).points == 200
+    for wrong in ({"points": 512, "budget_ms": 33.0}, {"budget_ms": 0.0}):
+        with pytest.raises(ConfigError, match="give one of them"):
+            Predictor.load(path, **wrong)
+
+
+def test_missing_data_are_no_answer_with_a_reason(small_dataset: PreparedDataset) -> None:
+    card = WeightsCard(network="pointnet2", num_points=160)
+    network = create_network("pointnet2")
+    half = replay(unflatten(small_dataset.rows[2])).points.copy()
+    half[:, :320] = np.nan
+    answer = Predictor(network, card, 160)(half)
+    assert answer.state is None
+    assert "the view is only" in answer.reason
+    assert set(answer.probabilities.values()) == {0.0}
+    assert answer.points == 160
+    asked = Predictor(network, card, 160, gate=None)(half)
+    assert asked.state is not None
+    assert asked.reason == ""
+
+
+def test_a_batch_answers_as_its_clouds_one_by_one(
+    predictor: Predictor, small_dataset: PreparedDataset
+) -> None:
+    raw = [replay(unflatten(row)).points for row in small_dataset.rows[:4]]
+    few = np.random.default_rng(0).uniform(1, 3, (140, 3)).astype(np.float32)
+    half = raw[0].copy()
+    half[:, 320:] = np.nan
+    clouds = [raw[0], few, half, raw[1].reshape(-1, 3), raw[2], raw[3]]
+    together, alone = predictor.batch(clouds), [predictor(cloud) for cloud in clouds]
+    for one, other in zip(together, alone, strict=True):
+        assert (one.state, one.points, one.reason) == (other.state, other.points, other.reason)
+        np.testing.assert_allclose(
+            list(one.probabilities.values()), list(other.probabilities.values()), atol=1e-5
+        )
+    assert [answer.state is None for answer in together] == [False, False, True, False, False, False]
+    assert predictor.batch([]) == []
+
+
+def test_equal_clouds_go_through_the_network_at_once(
+    predictor: Predictor, small_dataset: PreparedDataset
+) -> None:
+    sizes: list[int] = []
+    handle = predictor.network.register_forward_hook(lambda _, inputs, __: sizes.append(len(inputs[0])))
+    predictor.batch([replay(unflatten(row)).points for row in small_dataset.rows[:3]])
+    handle.remove()
+    assert sizes == [3]
+
+
+def test_threads_share_a_predictor(predictor: Predictor, small_dataset: PreparedDataset) -> None:
+    clouds = [small_dataset.cloud(number) for number in range(12)]
+    alone = [predictor(cloud).probabilities for cloud in clouds]
+    with ThreadPoolExecutor(4) as threads:
+        together = [answer.probabilities for answer in threads.map(predictor, clouds * 4)]
+    assert together == alone * 4
 
 
 @pytest.mark.parametrize("name", packaged_networks())
