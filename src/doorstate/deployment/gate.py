@@ -33,7 +33,7 @@ class Gate:
 
     Args:
         min_points: fewer measured points are refused; those of the largest neighbourhood of a network.
-        min_measured_share: of all pixels or rows; chosen: half of the emptiest simulated frame (0.47).
+        min_measured_share: of all pixels or rows; chosen: half of the emptiest simulated frame's (0.47).
         min_median_range_m: half of the points must be farther; chosen: two thirds of the nearest simulated frame's
             median (0.9), and an arm's length.
         min_extent_m: of the middle nine tenths of the points, in height and across; chosen: half a door's width,

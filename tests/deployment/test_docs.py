@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The Python shown in docs/deployment.md runs as it stands and prints what the text says."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+EXAMPLES = re.findall(
+    r"```python\n(.*?)```", (DOCS / "deployment.md").read_text(encoding="utf-8"), flags=re.DOTALL
+)
+PRINTED = (
+    r"^open \{'closed'",
+    r"hole without a floor 4 m away: glass or missing data$",
+    r"^\d+ points fit into 33 ms\n(<DoorState.OPEN: 2> \n){4}$",
+    r"^None since 0\.0 s(.*\n)*<DoorState.OPEN: 2> since 0\.[1-9] s",
+    r"^the way is free$",
+)
+
+
+@pytest.fixture(scope="module")
+def recording(simulated_folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A robot that stands before an open door for two seconds."""
+    folder = tmp_path_factory.mktemp("robot")
+    (folder / "recording").mkdir()
+    cloud = sorted((simulated_folder / "pcd" / "open").glob("*.pcd"))[0]
+    (folder / "cloud.pcd").symlink_to(cloud)
+    for number in range(20):
+        (folder / "recording" / f"{number:02d}.pcd").symlink_to(cloud)
+    return folder
+
+
+def test_there_are_five() -> None:
+    assert len(EXAMPLES) == len(PRINTED) == 5
+
+
+@pytest.mark.parametrize("number", range(5))
+def test_the_example_runs(
+    number: int, recording: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(recording)
+    exec(compile(EXAMPLES[number], f"docs/deployment.md, example {number + 1}", "exec"), {})
+    assert re.search(PRINTED[number], capsys.readouterr().out, flags=re.MULTILINE)
