@@ -141,6 +141,36 @@ def test_a_stopped_run_ends_as_if_it_had_not_been(
     assert results(tmp_path / "run") == results(finished)
 
 
+def test_a_run_stopped_within_an_epoch_goes_on_there_and_ends_the_same(
+    finished: Path,
+    small_dataset: PreparedDataset,
+    roles: dict[str, Role],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    steps = 0
+
+    def step(self: Any, batch: Any) -> float:
+        nonlocal steps
+        steps += 1
+        if steps == 6:  # the third of three in the second epoch
+            raise KeyboardInterrupt
+        return original(self, batch)
+
+    original = fit_module._Trainer._step
+    with monkeypatch.context() as patch:
+        patch.setattr(fit_module, "_SAVE_EVERY_S", 0.0)
+        patch.setattr(fit_module._Trainer, "_step", step)
+        with pytest.raises(KeyboardInterrupt):
+            fit(config(), small_dataset, roles, tmp_path / "run")
+    steps = -100
+    with monkeypatch.context() as patch:
+        patch.setattr(fit_module._Trainer, "_step", step)
+        fit(config(), small_dataset, roles, tmp_path / "run")
+    assert steps == -100 + 9 - 5, "only what was left"
+    assert results(tmp_path / "run") == results(finished)
+
+
 def test_training_leaves_the_global_generator_alone(
     small_dataset: PreparedDataset, roles: dict[str, Role], tmp_path: Path
 ) -> None:
@@ -215,9 +245,10 @@ def test_a_loss_that_is_no_number_stops_the_run(
 
 
 def test_a_split_without_samples_is_refused(small_dataset: PreparedDataset, tmp_path: Path) -> None:
-    everything: dict[str, Role] = {row["sample_id"]: "train" for row in small_dataset.rows}
+    names = [row["sample_id"] for row in small_dataset.rows]
+    unvalidated: dict[str, Role] = dict.fromkeys(names[:-5], "train") | dict.fromkeys(names[-5:], "test")  # type: ignore[assignment]
     with pytest.raises(DatasetError, match="0 samples for val"):
-        fit(config(), small_dataset, everything, tmp_path / "run")
+        fit(config(), small_dataset, unvalidated, tmp_path / "run")
 
 
 @pytest.mark.parametrize("name", ["pointnet", "dgcnn", "pointcnn", "point2sequence"])

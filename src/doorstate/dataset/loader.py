@@ -10,7 +10,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from doorstate.clouds.augment import Augmentation, apply_augmentation, draw_augmentation
+from doorstate.clouds.augment import Augmentation, AugmentationDraw, apply_augmentation, draw_augmentation
 from doorstate.clouds.preparation import normalize
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import ConfigError
@@ -68,22 +68,25 @@ class CloudLoader:
     def in_order(self, batch_size: int) -> Iterator[Batch]:
         """Every sample once, in order, unchanged."""
         for start in range(0, len(self), batch_size):
-            yield self._batch(np.arange(start, min(start + batch_size, len(self))), None, None)
+            yield self._batch(np.arange(start, min(start + batch_size, len(self))), None)
 
-    def shuffled(self, batch_size: int, augmentation: Augmentation, seed: Sequence[int]) -> Iterator[Batch]:
-        """One training epoch: shuffled, augmented, an incomplete last batch left out."""
+    def shuffled(
+        self, batch_size: int, augmentation: Augmentation, seed: Sequence[int], skip: int = 0
+    ) -> Iterator[Batch]:
+        """One training epoch: shuffled, augmented, an incomplete last batch and the first `skip` left out."""
         rng = np.random.default_rng(seed)
         order = rng.permutation(len(self))
         batch_size = min(batch_size, len(self))
-        for start in range(0, len(self) - batch_size + 1, batch_size):
-            yield self._batch(order[start : start + batch_size], augmentation, rng)
+        num_points = self._points.shape[1]
+        for number, start in enumerate(range(0, len(self) - batch_size + 1, batch_size)):
+            draw = draw_augmentation(augmentation, rng, batch_size, num_points)
+            if number >= skip:
+                yield self._batch(order[start : start + batch_size], draw)
 
-    def _batch(
-        self, chosen: np.ndarray, augmentation: Augmentation | None, rng: np.random.Generator | None
-    ) -> Batch:
+    def _batch(self, chosen: np.ndarray, draw: AugmentationDraw | None) -> Batch:
         points = self._points[chosen]
-        if augmentation is not None and rng is not None:
-            points = apply_augmentation(points, draw_augmentation(augmentation, rng, *points.shape[:2]))
+        if draw is not None:
+            points = apply_augmentation(points, draw)
         known = None if self._neighbours is None else self._neighbours(chosen)
         return Batch(torch.from_numpy(points), torch.from_numpy(self._labels[chosen]), known)
 

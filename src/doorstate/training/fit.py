@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One run: one network trained on one fold, in one folder, resumable at every epoch.
+"""One run: one network trained on one fold, in one folder, resumable; a killed one loses minutes.
 
 Everything random in an epoch comes from (seed, fold, epoch), so a run that was killed and started again ends with the
 same weights as one that was not, given the same number of threads.
@@ -38,6 +38,7 @@ from doorstate.types import STATES
 
 _EVALUATION_BATCH = 32
 _TELL_EVERY_S = 1.0
+_SAVE_EVERY_S = 180.0  # within an epoch, which can take a quarter of an hour
 
 
 class RunConfig(BaseModel):
@@ -88,8 +89,8 @@ def fit(
     Args:
         config: what to train.
         dataset: clouds.
-        roles: {sample_id: role} of this fold. Without validation samples the last epoch is kept, without test samples
-            nothing is tested: that is how weights for use are trained on everything, once a recipe has been chosen.
+        roles: {sample_id: role} of this fold. With neither validation nor test samples the last epoch is kept and nothing is
+            tested: that is how weights for use are trained on everything, once a recipe has been chosen.
         folder: of this run; finished runs are returned as they are, begun ones are continued.
 
     Returns:
@@ -138,6 +139,13 @@ def evaluate(network: PointNetwork, loader: CloudLoader, fabric: lightning_fabri
     return Evaluation(loss, all_logits.softmax(1).numpy(), all_labels.numpy())
 
 
+class _Begun(NamedTuple):
+    """How far an epoch is: iterations done, their losses, and torch's generator for what is left."""
+
+    losses: list[float]
+    generator: torch.Tensor
+
+
 class _Trainer:
     def __init__(
         self,
@@ -157,6 +165,7 @@ class _Trainer:
         self.log: list[dict[str, float]] = []
         self.best: tuple[float, float] = (-1.0, -math.inf)
         self.best_epoch = -1
+        self.begun: _Begun | None = None
         self._resume()
 
     def train(self) -> None:
@@ -219,10 +228,17 @@ class _Trainer:
         torch.manual_seed(_seed(config, epoch + 1))  # dropout
         per_epoch = max(1, len(loader) // recipe.batch_size)
         losses: list[float] = []
+        if self.begun is not None:
+            losses, generator = self.begun
+            torch.set_rng_state(generator)
+            self.begun = None
         self.network.train()
-        rate, told = 0.0, time.perf_counter()
-        batches = loader.shuffled(recipe.batch_size, recipe.augmentation, (config.seed, config.fold, epoch))
-        for iteration, batch in enumerate(batches, start=epoch * per_epoch):
+        rate = 0.0
+        told = saved = time.perf_counter()
+        batches = loader.shuffled(
+            recipe.batch_size, recipe.augmentation, (config.seed, config.fold, epoch), skip=len(losses)
+        )
+        for iteration, batch in enumerate(batches, start=epoch * per_epoch + len(losses)):
             rate = learning_rate(recipe, iteration, per_epoch, config.num_points)
             for group in self.optimizer.param_groups:
                 group["lr"] = rate
@@ -233,6 +249,9 @@ class _Trainer:
                 told = time.perf_counter()
                 self.run.write_position(iteration / per_epoch)
             losses.append(self._step(self.fabric.to_device(batch)))
+            if time.perf_counter() - saved > _SAVE_EVERY_S:
+                saved = time.perf_counter()
+                self._checkpoint(_Begun(losses, torch.get_rng_state()))
         mean = float(np.mean(losses))
         if not math.isfinite(mean):
             raise RunError(f"{self.run.path}: the loss is {mean} in epoch {epoch}; try a lower learning rate")
@@ -255,13 +274,14 @@ class _Trainer:
         self.optimizer.step()
         return float(loss.detach())
 
-    def _checkpoint(self) -> None:
+    def _checkpoint(self, begun: _Begun | None = None) -> None:
         state = {
             "network": self.network.state_dict(),
             "optimizer": self.optimizer.state_dict(),
             "log": self.log,
             "best": list(self.best),
             "best_epoch": self.best_epoch,
+            "begun": None if begun is None else list(begun),
         }
         with atomic_path(self.run.checkpoint) as temporary:
             torch.save(state, temporary)
@@ -280,6 +300,7 @@ class _Trainer:
         self.optimizer.load_state_dict(state["optimizer"])
         self.log, self.best_epoch = state["log"], state["best_epoch"]
         self.best = (state["best"][0], state["best"][1])
+        self.begun = _Begun(*state["begun"]) if state.get("begun") else None
 
     def _card(self) -> WeightsCard:
         config = self.config
@@ -333,8 +354,9 @@ def _samples(roles: Mapping[str, Role]) -> dict[str, list[str]]:
     samples: dict[str, list[str]] = {"train": [], "val": [], "test": [], "unused": []}
     for sample, role in roles.items():
         samples[role].append(sample)
-    for role in ("train", "val", "test"):
-        if len(samples[role]) == 1 or (role == "train" and not samples[role]):
+    everything = not samples["val"] and not samples["test"]
+    for role in ("train",) if everything else ("train", "val", "test"):
+        if len(samples[role]) < 2:
             raise DatasetError(
                 f"only {len(samples[role])} samples for {role}: the data set is too small for this split"
             )
