@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections import defaultdict
 from dataclasses import dataclass
 from pathlib import Path
@@ -100,7 +101,7 @@ def write_page(results_folder: Path, rows_folder: Path, page: Path) -> None:
         table=_table,
         percent=lambda value, digits=2: f"{100 * value:.{digits}f} %",
     )
-    write_text(page, text)
+    write_text(page, re.sub(r"\n{3,}", "\n\n", text).strip() + "\n")
 
 
 def unfinished_runs(folder: Path) -> list[str]:

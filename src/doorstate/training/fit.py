@@ -89,8 +89,8 @@ def fit(
     Args:
         config: what to train.
         dataset: clouds.
-        roles: {sample_id: role} of this fold. With neither validation nor test samples the last epoch is kept and nothing is
-            tested: that is how weights for use are trained on everything, once a recipe has been chosen.
+        roles: {sample_id: role} of this fold. With neither validation nor test samples the last epoch is kept and
+            nothing is tested: that is how weights for use are trained on everything, once a recipe has been chosen.
         folder: of this run; finished runs are returned as they are, begun ones are continued.
 
     Returns:
@@ -355,7 +355,8 @@ def _samples(roles: Mapping[str, Role]) -> dict[str, list[str]]:
     for sample, role in roles.items():
         samples[role].append(sample)
     everything = not samples["val"] and not samples["test"]
-    for role in ("train",) if everything else ("train", "val", "test"):
+    needed: tuple[Role, ...] = ("train",) if everything else ("train", "val", "test")
+    for role in needed:
         if len(samples[role]) < 2:
             raise DatasetError(
                 f"only {len(samples[role])} samples for {role}: the data set is too small for this split"
