@@ -29,6 +29,7 @@ PROTOCOLS = {
         "All states of a pose stay on one side of a fold, and poses within 0.5 m of a tested one are used by "
         "nobody in that fold: no near-copy of a test cloud was trained on."
     ),
+    "all": "Everything was trained on and nothing tested.",
 }
 
 
