@@ -1,21 +1,25 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A small simulated and prepared data set that many tests read and none changes."""
+"""A small simulated and prepared data set that many tests read and none changes, and the command in this process."""
 
 from __future__ import annotations
 
 import os
+import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 import torch
 from hypothesis import settings
 
+from doorstate.cli import main
 from doorstate.dataset.prepare import prepare_dataset
 from doorstate.dataset.store import PreparedDataset
 from doorstate.simulation.generate import PRESETS
 from doorstate.simulation.run import SimulationSettings, simulate_dataset
 
 SMALL_POINTS = 160
+Run = Callable[..., tuple[int, str, str]]
 
 # A landing must not depend on luck; everybody else's runs go on looking for new counterexamples.
 settings.register_profile("ci", derandomize=True)
@@ -43,3 +47,22 @@ def small_dataset(simulated_folder: Path, tmp_path_factory: pytest.TempPathFacto
     """The same samples with 160 points each."""
     folder = tmp_path_factory.mktemp("prepared") / "small"
     return prepare_dataset(simulated_folder, folder, SMALL_POINTS, workers=1).dataset
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Run:
+    """Run the command in this process: exit code, standard output, standard error."""
+
+    def call(*arguments: object) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["doorstate", *map(str, arguments)])
+        code = 0
+        try:
+            main()
+        except SystemExit as end:
+            if isinstance(end.code, str):
+                print(end.code, file=sys.stderr)
+            code = 1 if isinstance(end.code, str) else end.code or 0
+        captured = capsys.readouterr()
+        return code, captured.out, captured.err
+
+    return call

@@ -16,7 +16,6 @@ import pytest
 from PIL import Image
 
 import doorstate
-from doorstate.cli import main
 from doorstate.clouds.pcd import write_pcd
 from doorstate.dataset.store import PreparedDataset
 from doorstate.networks import create_network, list_networks
@@ -25,25 +24,6 @@ from doorstate.training.weights import WeightsCard, save_weights
 Run = Callable[..., tuple[int, str, str]]
 REAL = Path(__file__).resolve().parents[1].parent / "shared" / "real"
 COMMANDS = ("simulate", "prepare", "train", "compare", "report", "resolution", "predict", "info")
-
-
-@pytest.fixture
-def run(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Run:
-    """Run the command in this process: exit code, standard output, standard error."""
-
-    def call(*arguments: object) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["doorstate", *map(str, arguments)])
-        code = 0
-        try:
-            main()
-        except SystemExit as end:
-            if isinstance(end.code, str):
-                print(end.code, file=sys.stderr)
-            code = 1 if isinstance(end.code, str) else end.code or 0
-        captured = capsys.readouterr()
-        return code, captured.out, captured.err
-
-    return call
 
 
 @pytest.fixture(scope="session")

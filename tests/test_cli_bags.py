@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import csv
 import json
-import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +15,6 @@ import pytest
 pytest.importorskip("rosbags")
 
 from bag_writer import START_NS, Message, camera_info, cloud, image, write_bag
-from doorstate.cli import main
 from doorstate.networks import create_network
 from doorstate.training.weights import WeightsCard, save_weights
 from doorstate.types import STATES
@@ -26,22 +25,9 @@ STAMPS = [f"17000000{second}.500000" for second in ("00", "01", "02", "03")]
 
 
 @pytest.fixture
-def run(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Run:
-    """Run `doorstate predict` in this process: exit code, standard output, standard error."""
-
-    def call(*arguments: object) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["doorstate", "predict", *map(str, arguments)])
-        code = 0
-        try:
-            main()
-        except SystemExit as end:
-            if isinstance(end.code, str):
-                print(end.code, file=sys.stderr)
-            code = 1 if isinstance(end.code, str) else end.code or 0
-        captured = capsys.readouterr()
-        return code, captured.out, captured.err
-
-    return call
+def predict(run: Run) -> Run:
+    """Run `doorstate predict`."""
+    return partial(run, "predict")
 
 
 @pytest.fixture(scope="module")
@@ -70,8 +56,8 @@ def partly_bad(tmp_path: Path) -> Path:
     return write_bag(tmp_path, "bag", messages)
 
 
-def test_a_table_has_a_row_per_message(run: Run, weights: Path, bag: Path) -> None:
-    code, out, err = run("--bag", bag, "--topic", "/points", "--weights", weights)
+def test_a_table_has_a_row_per_message(predict: Run, weights: Path, bag: Path) -> None:
+    code, out, err = predict("--bag", bag, "--topic", "/points", "--weights", weights)
     assert (code, err) == (0, "")
     rows = [line.replace("│", " ").split() for line in out.splitlines() if "│ 17" in line]
     assert [row[0] for row in rows] == STAMPS
@@ -80,11 +66,11 @@ def test_a_table_has_a_row_per_message(run: Run, weights: Path, bag: Path) -> No
 
 
 def test_answers_are_those_of_the_same_cloud_in_a_file(
-    run: Run, weights: Path, bag: Path, tmp_path: Path
+    predict: Run, weights: Path, bag: Path, tmp_path: Path
 ) -> None:
     np.save(tmp_path / "cloud.npy", POINTS.reshape(-1, 3))
-    of_file = json.loads(run(tmp_path / "cloud.npy", "--weights", weights, "--json")[1])
-    code, out, _ = run("--bag", bag, "--weights", weights, "--json", "--every", 2)
+    of_file = json.loads(predict(tmp_path / "cloud.npy", "--weights", weights, "--json")[1])
+    code, out, _ = predict("--bag", bag, "--weights", weights, "--json", "--every", 2)
     answers = [json.loads(line) for line in out.splitlines()]
     assert code == 0
     assert [answer["stamp_s"] for answer in answers] == [1_700_000_000.5, 1_700_000_002.5]
@@ -92,9 +78,9 @@ def test_answers_are_those_of_the_same_cloud_in_a_file(
     assert all(set(answer) ^ set(of_file) == {"stamp_s", "file"} for answer in answers)
 
 
-def test_a_csv_has_answers_and_errors(run: Run, weights: Path, partly_bad: Path, tmp_path: Path) -> None:
+def test_a_csv_has_answers_and_errors(predict: Run, weights: Path, partly_bad: Path, tmp_path: Path) -> None:
     table = tmp_path / "deep" / "answers.csv"
-    code, out, err = run("--bag", partly_bad, "--weights", weights, "--out", table)
+    code, out, err = predict("--bag", partly_bad, "--weights", weights, "--out", table)
     assert (code, out) == (1, "")
     assert err == "2 of 4 messages could not be answered\n"
     with table.open(newline="") as stream:
@@ -109,11 +95,11 @@ def test_a_csv_has_answers_and_errors(run: Run, weights: Path, partly_bad: Path,
 
 
 def test_json_lines_in_a_file_are_those_that_json_prints(
-    run: Run, weights: Path, partly_bad: Path, tmp_path: Path
+    predict: Run, weights: Path, partly_bad: Path, tmp_path: Path
 ) -> None:
     lines = tmp_path / "answers.jsonl"
-    assert run("--bag", partly_bad, "--weights", weights, "--out", lines)[0] == 1
-    code, out, _ = run("--bag", partly_bad, "--weights", weights, "--json")
+    assert predict("--bag", partly_bad, "--weights", weights, "--out", lines)[0] == 1
+    code, out, _ = predict("--bag", partly_bad, "--weights", weights, "--json")
     assert code == 1
     written, printed = ([json.loads(line) for line in text.splitlines()] for text in (lines.read_text(), out))
     for answer in written + printed:
@@ -122,61 +108,65 @@ def test_json_lines_in_a_file_are_those_that_json_prints(
     assert set(written[1]) == {"stamp_s", "error"}
 
 
-def test_errors_of_a_table_are_lines_of_their_own(run: Run, weights: Path, partly_bad: Path) -> None:
-    code, out, err = run("--bag", partly_bad, "--weights", weights)
+def test_errors_of_a_table_are_lines_of_their_own(predict: Run, weights: Path, partly_bad: Path) -> None:
+    code, out, err = predict("--bag", partly_bad, "--weights", weights)
     assert code == 1
     assert [line.partition(":")[0] for line in err.splitlines()[:2]] == STAMPS[1:3]
     assert all((stamp in out) == (stamp in (STAMPS[0], STAMPS[3])) for stamp in STAMPS)
 
 
-def test_answers_before_a_break_are_kept(run: Run, weights: Path, tmp_path: Path) -> None:
+def test_answers_before_a_break_are_kept(predict: Run, weights: Path, tmp_path: Path) -> None:
     path = write_bag(tmp_path, "bag", recording())
     first, second, *rest = path.read_bytes().split(b"op=\x02")  # the records that hold messages
     path.write_bytes(b"op=\x02".join([first, second]) + b"op=\x09" + b"op=\x02".join(rest))
-    code, out, err = run("--bag", path, "--weights", weights, "--json")
+    code, out, err = predict("--bag", path, "--weights", weights, "--json")
     good, broken = (json.loads(line) for line in out.splitlines())
     assert code == 1
     assert good["state"] in STATES
     assert broken["stamp_s"] is None
     assert "damaged from here on" in broken["error"]
     assert err == "1 of 2 messages could not be answered\n"
-    out_of_table = run("--bag", path, "--weights", weights)[2]
+    out_of_table = predict("--bag", path, "--weights", weights)[2]
     assert out_of_table.startswith("-: test.bag: damaged from here on")
 
 
-def test_rules_see_images(run: Run, bag: Path) -> None:
-    code, out, _ = run("--bag", bag, "--rule", "open_door", "--json")
+def test_rules_see_images(predict: Run, bag: Path) -> None:
+    code, out, _ = predict("--bag", bag, "--rule", "open_door", "--json")
     answers = [json.loads(line) for line in out.splitlines()]
     assert code == 0
     assert len(answers) == 4
     assert all("organized" not in answer.get("reason", "") for answer in answers)
 
 
-def test_depth_images_are_answered_with_the_camera_named(run: Run, weights: Path, tmp_path: Path) -> None:
+def test_depth_images_are_answered_with_the_camera_named(predict: Run, weights: Path, tmp_path: Path) -> None:
     depth = np.random.default_rng(1).integers(1000, 3000, (20, 25), dtype=np.uint16)
     k = (20, 0, 12, 0, 20, 9.5, 0, 0, 1)
     messages = [image("/depth", depth, "16UC1"), camera_info("/my_camera", 25, 20, k, [0] * 12)]
     path = write_bag(tmp_path, "db3", messages)
-    code, _, err = run("--bag", path, "--weights", weights)
+    code, _, err = predict("--bag", path, "--weights", weights)
     assert code == 1
     assert "no CameraInfo in /camera_info" in err
     assert len(err.splitlines()) == 1
-    code, named, _ = run("--bag", path, "--weights", weights, "--json", "--camera-info-topic", "/my_camera")
+    code, named, _ = predict(
+        "--bag", path, "--weights", weights, "--json", "--camera-info-topic", "/my_camera"
+    )
     assert code == 0
     flags = ("--fx", 20, "--fy", 20, "--cx", 12, "--cy", 9.5)
-    given = run("--bag", path, "--weights", weights, "--json", *flags)[1]
+    given = predict("--bag", path, "--weights", weights, "--json", *flags)[1]
     assert json.loads(named)["probabilities"] == json.loads(given)["probabilities"]
 
 
-def test_an_optical_frame_that_is_read_as_body_is_said_once(run: Run, weights: Path, tmp_path: Path) -> None:
+def test_an_optical_frame_that_is_read_as_body_is_said_once(
+    predict: Run, weights: Path, tmp_path: Path
+) -> None:
     messages = recording()
     for message in messages:
         message.frame_id = "camera_depth_optical_frame"
     path = write_bag(tmp_path, "mcap", messages)
-    code, _, err = run("--bag", path, "--weights", weights)
+    code, _, err = predict("--bag", path, "--weights", weights)
     assert code == 0
     assert err == "/points is in the frame camera_depth_optical_frame: is --frame optical missing?\n"
-    assert run("--bag", path, "--weights", weights, "--frame", "optical")[2] == ""
+    assert predict("--bag", path, "--weights", weights, "--frame", "optical")[2] == ""
 
 
 @pytest.mark.parametrize(
@@ -194,9 +184,9 @@ def test_an_optical_frame_that_is_read_as_body_is_said_once(run: Run, weights: P
     ],
 )
 def test_usage_errors_are_one_line(
-    arguments: tuple[object, ...], complaint: str, expected: int, run: Run, weights: Path, bag: Path
+    arguments: tuple[object, ...], complaint: str, expected: int, predict: Run, weights: Path, bag: Path
 ) -> None:
-    code, out, err = run(*(bag if word == "BAG" else word for word in arguments), "--weights", weights)
+    code, out, err = predict(*(bag if word == "BAG" else word for word in arguments), "--weights", weights)
     assert (code, out) == (expected, "")
     assert len(err.splitlines()) == 1
     assert err.startswith("doorstate: ")
