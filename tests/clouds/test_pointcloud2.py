@@ -105,6 +105,13 @@ def test_doubles_beyond_float32_are_infinite() -> None:
     np.testing.assert_array_equal(points_from_pointcloud2(**message), np.float32([[np.inf, -np.inf, 0.1]]))
 
 
+@pytest.mark.parametrize("row_step", [0, 12, 35, 37, 10**9])
+def test_points_that_fill_the_data_are_read_whatever_row_step_a_driver_left(row_step: int) -> None:
+    np.testing.assert_array_equal(
+        points_from_pointcloud2(**MESSAGE | {"row_step": row_step}), points_from_pointcloud2(**MESSAGE)
+    )
+
+
 @pytest.mark.parametrize("extent", [(0, 0), (1, 0), (2**32 - 1, 0), (0, 2**32 - 1)])
 def test_no_points_are_an_empty_cloud(extent: tuple[int, int]) -> None:
     message = MESSAGE | {"height": extent[0], "width": extent[1], "row_step": 0, "data": b""}
@@ -123,8 +130,8 @@ def test_no_points_are_an_empty_cloud(extent: tuple[int, int]) -> None:
         ({"fields": [*PACKED[:2], Field("z", 8, 8)]}, "z at byte 8 is not within 12 bytes"),
         ({"fields": [Field("x", -1, 7), *PACKED[1:]]}, "x at byte -1 is not within 12 bytes"),
         ({"point_step": 0}, "not within 0 bytes a point"),
-        ({"row_step": 0}, "3 points of 12 bytes do not fit into rows of 0"),
-        ({"row_step": 35}, "do not fit into rows of 35"),
+        ({"row_step": 0, "data": MESSAGE["data"] + b"x"}, "3 points of 12 bytes do not fit into rows of 0"),
+        ({"row_step": 35, "data": MESSAGE["data"] + b"x"}, "do not fit into rows of 35"),
         ({"data": MESSAGE["data"][:-1]}, "is truncated: 72 bytes are declared, 71 are there"),
         ({"data": b""}, "is truncated: 72 bytes are declared, 0 are there"),
         ({"height": 2**32 - 1}, "is truncated"),

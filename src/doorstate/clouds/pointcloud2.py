@@ -68,11 +68,15 @@ def points_from_pointcloud2(
     if height * width == 0:
         return np.empty((0, 3), np.float32)
     places = [_place(axis, fields, point_step) for axis in "xyz"]
+    content = np.frombuffer(data, np.uint8)
+    # Drivers leave 0 or an old row_step behind (ros-drivers/velodyne#279, realsense-ros#1668): points that fill
+    # the data to the last byte have rows without padding, whatever is declared.
+    if len(content) == height * width * point_step:
+        row_step = width * point_step
     if width * point_step > row_step:
         raise CloudReadError(
             f"is damaged: {width} points of {point_step} bytes do not fit into rows of {row_step}"
         )
-    content = np.frombuffer(data, np.uint8)
     check_declared(height * row_step, len(content), "bytes")
     points = np.empty((height, width, 3), np.float32)
     # What a double holds beyond float32 is as good as infinite: no return.
