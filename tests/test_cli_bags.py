@@ -51,7 +51,7 @@ def bag(tmp_path: Path) -> Path:
 def partly_bad(tmp_path: Path) -> Path:
     """The second message is damaged, the third is empty."""
     messages = recording()
-    messages[1].fields["row_step"] = 0
+    messages[1].fields["point_step"] = 0
     messages[2] = cloud("/points", POINTS[:0, 0], messages[2].stamp_ns)
     return write_bag(tmp_path, "bag", messages)
 
@@ -87,7 +87,7 @@ def test_a_csv_has_answers_and_errors(predict: Run, weights: Path, partly_bad: P
         rows = list(csv.DictReader(stream))
     assert [float(row["stamp_s"]) for row in rows] == [float(stamp) for stamp in STAMPS]
     assert [row["error"] != "" for row in rows] == [False, True, True, False]
-    assert "rows of 0" in rows[1]["error"]
+    assert "within 0 bytes" in rows[1]["error"]
     assert "the cloud is empty" in rows[2]["error"]
     assert {rows[1][column] for column in ("state", *STATES, "points", "milliseconds")} == {""}
     assert sum(float(rows[0][state]) for state in STATES) == pytest.approx(1, abs=1e-5)

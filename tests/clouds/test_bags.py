@@ -250,7 +250,7 @@ def test_depth_images_without_a_camera_are_one_line(info: Message, reason: str, 
 @pytest.mark.parametrize(
     ("bad", "reason"),
     [
-        (cloud("/t", ORGANIZED, START_NS, row_step=0), "do not fit into rows of 0"),
+        (cloud("/t", ORGANIZED, START_NS, point_step=0), "not within 0 bytes a point"),
         (cloud("/t", ORGANIZED, START_NS, height=2**32 - 1), "is truncated"),
         (image("/t", DEPTH_MM, "rgb8"), "is an image in rgb8"),
         (
