@@ -205,11 +205,18 @@ def curves(
     from doorstate.dataset.splits import draw_splits
     from doorstate.dataset.store import open_dataset
     from doorstate.training.fit import RunConfig
+    from doorstate.clouds.augment import Augmentation
     from doorstate.training.recipes import COMMON
 
     (name,) = _names(network)
     dataset = open_dataset(data)
-    recipe = COMMON.model_copy(update={"epochs": epochs})
+    # As the published curves were trained, whatever the common recipe has become since.
+    changes = {
+        "epochs": epochs,
+        "learning_rate": 1e-3,
+        "augmentation": Augmentation(yaw_deg=15.0, mirror=0.5, scale=(0.9, 1.1)),
+    }
+    recipe = COMMON.model_copy(update=changes)
     config = RunConfig(
         network=name,
         dataset=dataset.description.source,

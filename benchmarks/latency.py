@@ -29,7 +29,8 @@ STAGES = ("clean", "sample", "network", "total")
 _NOTE = (
     "Milliseconds of one `Predictor` call, median (90th percentile), on a simulated 640 × 480 cloud in memory; the "
     "weights are untrained, which changes no time. *Clean* drops unmeasured points and checks the rest, *sample* puts "
-    "them in farthest-point order, *network* centres them and computes the probabilities."
+    "them in farthest-point order, *network* centres them and computes the probabilities; it includes the "
+    "gate on missing data."
 )
 
 

@@ -19,7 +19,7 @@ from doorstate.simulation.generate import Frame, replay
 from doorstate.simulation.manifest import unflatten
 from doorstate.types import Part, Points
 
-REAL = Path("/work/shared/real")
+REAL = Path(__file__).resolve().parents[3] / "shared" / "real"
 HEIGHT, WIDTH = 480, 640
 
 

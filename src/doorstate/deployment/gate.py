@@ -12,15 +12,11 @@ from doorstate.clouds.preparation import MIN_POINTS
 from doorstate.types import Points
 
 _NO_RETURN = 1e6  # as clouds.preparation: some drivers write FLT_MAX where nothing returned
-_GRID_ROWS = (
-    60  # cells of 8 x 8 pixels in a 640 x 480 image: hundredths of a door, tens of pixels to judge by
-)
-_GRID_COLUMNS = 80
+# Cells of 8 x 8 pixels in a 640 x 480 image: hundredths of a door, tens of pixels to judge by.
+_GRID_ROWS, _GRID_COLUMNS = 60, 80
 _POINTS_PER_CELL = 16  # on average; a flat cloud with fewer has gaps of its own
 _CELL_MEASURED = 1 / 8  # of a cell's pixels; fewer are flying pixels
-_WIDEST_TANGENT = (
-    1.0  # flat clouds are looked at within 45 degrees of straight ahead, as no depth camera sees more
-)
+_WIDEST_TANGENT = 1.0  # flat clouds are looked at within 45 degrees of straight ahead: no depth camera sees more
 
 
 @dataclass(frozen=True)
@@ -33,9 +29,9 @@ class Gate:
 
     Args:
         min_points: fewer measured points are refused; those of the largest neighbourhood of a network.
-        min_measured_share: of all pixels or rows; chosen: half of the emptiest simulated frame's (0.47).
-        min_median_range_m: half of the points must be farther; chosen: two thirds of the nearest simulated frame's
-            median (0.9), and an arm's length.
+        min_measured_share: of all pixels or rows; chosen: half of the emptiest simulated frames'.
+        min_median_range_m: half of the points must be farther; chosen: nearer than any simulated frame's median,
+            and an arm's length.
         min_extent_m: of the middle nine tenths of the points, in height and across; chosen: half a door's width,
             which a floor or a hand alone does not have.
         min_view_deg: across, between the outermost rays; chosen: half an image with a lens of 60 degrees shows 30, an
@@ -47,7 +43,7 @@ class Gate:
         max_hole_share: of the columns looked at, with holes and no such floor; chosen: 0.25 m of a door 3 m away
             with a lens of 60 degrees.
         margin_share: of the columns left out on each side; chosen: stereo and registered cameras measure nothing in
-            up to a tenth (real frames).
+            up to a tenth.
     """
 
     min_points: int = MIN_POINTS
