@@ -202,10 +202,10 @@ def curves(
       python -m benchmarks curves --data data/ogurob-4096 --network dgcnn --points 256 --epochs 4 --out reports/speed
     """
     from benchmarks.curves import curves_table, draw_curves, train_both
+    from doorstate.clouds.augment import Augmentation
     from doorstate.dataset.splits import draw_splits
     from doorstate.dataset.store import open_dataset
     from doorstate.training.fit import RunConfig
-    from doorstate.clouds.augment import Augmentation
     from doorstate.training.recipes import COMMON
 
     (name,) = _names(network)

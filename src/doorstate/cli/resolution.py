@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-_TIMED_CLOUDS = 9
+_TIMED_CLOUDS, _REPEATS = 9, 3
 
 
 def resolution(
@@ -23,10 +23,10 @@ def resolution(
       doorstate resolution experiments/resolution.toml
       doorstate resolution experiments/resolution.toml --jobs 2 --out runs/points
     """
-    from doorstate.console import live_runs, print_table, progress_bar
+    from doorstate.cli.training import compare_live
+    from doorstate.console import print_table, progress_bar
     from doorstate.dataset.store import open_dataset
-    from doorstate.deployment.latency import median_milliseconds
-    from doorstate.deployment.predictor import Predictor
+    from doorstate.deployment.predictor import Predictor, median_milliseconds
     from doorstate.evaluation.resolution import (
         LATENCY,
         load_resolution,
@@ -34,17 +34,14 @@ def resolution(
         write_resolution,
     )
     from doorstate.simulation.manifest import write_csv
-    from doorstate.training.comparison import compare, run_of, runs_of
+    from doorstate.training.comparison import run_of
     from doorstate.training.environment import keep_freed_memory
     from doorstate.training.resolution import AS_TRAINED, load_study
 
     settings = load_study(study)
     folder = out or Path("runs") / settings.name
     for name, experiment in settings.experiments():
-        runs = runs_of(experiment, folder / name)
-        recipes = {network: experiment.recipe_of(network) for network in experiment.networks}
-        with live_runs(runs, recipes, experiment.num_points, jobs) as progress:
-            compare(experiment, folder / name, jobs, progress)
+        compare_live(experiment, folder / name, jobs)
 
     if not (folder / LATENCY).is_file():
         keep_freed_memory()  # as `doorstate predict` does
@@ -54,7 +51,7 @@ def resolution(
             wanted = [(network, points) for network in settings.networks for points in settings.points]
             for done, (network, points) in enumerate(wanted):
                 weights = run_of(folder / f"{AS_TRAINED}-{points}", network, 0).weights
-                median_ms = median_milliseconds(Predictor.load(weights, points), clouds)
+                median_ms = median_milliseconds(Predictor.load(weights, points), clouds, _REPEATS)
                 timed.append({"network": network, "points": str(points), "median_ms": f"{median_ms:.2f}"})
                 update(done + 1, len(wanted))
         write_csv(folder / LATENCY, timed)

@@ -4,11 +4,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from doorstate.cli.options import Changes, recipe_changes
+
+if TYPE_CHECKING:
+    from doorstate.training.comparison import Experiment
 
 
 def train(
@@ -96,11 +99,10 @@ def compare(
       doorstate compare experiments/one-fold.toml
       doorstate compare --data data/ogurob-4096 --protocol by-pose --networks pointnet,dgcnn --out runs/two
     """
-    from doorstate.console import live_runs, print_table
     from doorstate.console import out as stdout
+    from doorstate.console import print_table
     from doorstate.dataset.splits import EVERYTHING
-    from doorstate.training.comparison import compare as run_comparison
-    from doorstate.training.comparison import load_experiment, runs_of
+    from doorstate.training.comparison import load_experiment
 
     given: dict[str, Any] = {
         "dataset": None if data is None else str(data),
@@ -117,10 +119,7 @@ def compare(
         overrides.setdefault("name", out.name if out else "comparison")
     settings = load_experiment(experiment, overrides | {"recipe_changes": recipe_changes(changes, epochs)})
     folder = out or Path("runs") / settings.name
-    runs = runs_of(settings, folder)
-    recipes = {network: settings.recipe_of(network) for network in settings.networks}
-    with live_runs(runs, recipes, settings.num_points, jobs) as progress:
-        metrics = run_comparison(settings, folder, jobs, progress)
+    metrics = compare_live(settings, folder, jobs)
     if settings.protocol == EVERYTHING:
         stdout.print(f"trained on all samples, tested on none: weights in {folder / 'runs'}", soft_wrap=True)
         return
@@ -157,6 +156,17 @@ def report(
         else:
             page = write_dataset_figures(folder, target)
     stdout.print(f"report: {page}", soft_wrap=True)
+
+
+def compare_live(experiment: Experiment, folder: Path, jobs: int) -> list[dict[str, Any]]:
+    """Run a comparison and show how far it is; metrics of every run."""
+    from doorstate.console import live_runs
+    from doorstate.training.comparison import compare as run_comparison
+    from doorstate.training.comparison import runs_of
+
+    recipes = {network: experiment.recipe_of(network) for network in experiment.networks}
+    with live_runs(runs_of(experiment, folder), recipes, experiment.num_points, jobs) as progress:
+        return run_comparison(experiment, folder, jobs, progress)
 
 
 def _names(text: str | None) -> tuple[str, ...] | None:

@@ -9,22 +9,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from doorstate.clouds.camera import Intrinsics, Pinhole
-from doorstate.clouds.depth import depth_to_points, points_from_optical, undo_roll
+from doorstate.clouds.camera import Intrinsics
 from doorstate.clouds.depth_messages import (
     check_compressed_format,
     check_encoding,
     pixels_from_compressed_depth,
     pixels_from_image,
 )
-from doorstate.clouds.io import DEFAULT_OPTIONS, ReadOptions
+from doorstate.clouds.io import DEFAULT_OPTIONS, ReadOptions, points_from_depth, points_in_body
 from doorstate.clouds.pointcloud2 import points_from_pointcloud2
 from doorstate.errors import CameraError, CloudReadError, DoorstateError, MissingExtraError
 from doorstate.types import Points
@@ -36,7 +33,6 @@ _COMPRESSED = "sensor_msgs/msg/CompressedImage"
 _CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
 _COMPRESSED_DEPTH = "/compressedDepth"  # how image_transport ends the names of such topics
 _ZSTD = b"\x28\xb5\x2f\xfd"  # RFC 8878, 3.1.1
-_NO_RETURN = 65535
 
 
 class BagTopic(NamedTuple):
@@ -210,10 +206,10 @@ class Bag:
     ) -> Callable[[Any], Points]:
         if topic.type == CLOUD:
             return lambda message: _points_from_cloud(message, options)
-        camera = options.intrinsics
-        if camera_info_topic is not None or camera is None:
+        if camera_info_topic is not None or options.intrinsics is None:
             camera = self._camera(camera_info_topic or _camera_info_beside(topic.name))
-        return lambda message: _points_from_depth(message, topic.type, options, camera)
+            options = replace(options, intrinsics=camera)
+        return lambda message: _points_from_depth(message, topic.type, options)
 
     def _camera(self, name: str) -> Intrinsics:
         """Camera of rectified images, as ROS' own depth_image_proc takes it: P, or K where P is not set."""
@@ -244,30 +240,17 @@ def _points_from_cloud(message: Any, options: ReadOptions) -> Points:
         message.row_step,
         message.data,
     )
-    with np.errstate(over="ignore"):
-        points = (points.astype(np.float64) * options.units_m).astype(np.float32)
-    if options.frame == "optical":
-        points = points_from_optical(points)
-    return undo_roll(points, options.roll_deg)
+    return points_in_body(points, options)
 
 
-def _points_from_depth(
-    message: Any, message_type: str, options: ReadOptions, camera: Intrinsics | Pinhole
-) -> Points:
-    pixels: NDArray[Any]
+def _points_from_depth(message: Any, message_type: str, options: ReadOptions) -> Points:
     if message_type == _COMPRESSED:
         pixels = pixels_from_compressed_depth(message.format, message.data)
     else:
         pixels = pixels_from_image(
             message.height, message.width, message.encoding, message.is_bigendian, message.step, message.data
         )
-    is_integer = pixels.dtype.kind == "u"
-    depth_m = pixels.astype(np.float64) * (options.depth_scale_m if is_integer else options.units_m)
-    if is_integer:
-        depth_m[pixels == _NO_RETURN] = np.nan
-    height, width = pixels.shape
-    intrinsics = Intrinsics(width, height, *camera) if isinstance(camera, Pinhole) else camera
-    return depth_to_points(depth_m, intrinsics, options.roll_deg)
+    return points_from_depth(pixels, options)
 
 
 def _camera_info_beside(topic: str) -> str:

@@ -101,7 +101,8 @@ def read_cloud(path: Path, options: ReadOptions = DEFAULT_OPTIONS) -> Points:
             warnings.simplefilter("ignore")
             stored = _PARSERS[suffix](data)
             is_depth = suffix == ".png" or (stored.ndim == 2 and stored.shape[1] > _MAX_POINT_VALUES)
-            return _points_from_depth(stored, options) if is_depth else _points_from_rows(stored, options)
+            points = points_from_depth(stored, options) if is_depth else _points_from_rows(stored, options)
+            return points.reshape(-1, 3)
     except DoorstateError as error:
         raise type(error)(f"{path.name}: {error}") from error
     except Exception as error:
@@ -156,7 +157,12 @@ def _read_bytes(path: Path) -> bytes:
     return data
 
 
-def _points_from_depth(stored: NDArray[Any], options: ReadOptions) -> Points:
+def points_from_depth(stored: NDArray[Any], options: ReadOptions) -> Points:
+    """(H, W, 3) metres in the body frame of (H, W) stored depth.
+
+    Raises:
+        CameraError: intrinsics are missing, or are for another image size.
+    """
     height, width = stored.shape
     intrinsics = options.intrinsics
     if intrinsics is None:
@@ -170,14 +176,19 @@ def _points_from_depth(stored: NDArray[Any], options: ReadOptions) -> Points:
     depth_m = stored.astype(np.float64) * scale_m
     if stored.dtype.newbyteorder("=") == np.uint16:
         depth_m[stored == _NO_RETURN] = np.nan
-    return depth_to_points(depth_m, intrinsics, options.roll_deg).reshape(-1, 3)  # (H * W, 3)
+    return depth_to_points(depth_m, intrinsics, options.roll_deg)
 
 
 def _points_from_rows(stored: NDArray[Any], options: ReadOptions) -> Points:
     if stored.ndim not in (2, 3) or not 3 <= stored.shape[-1] <= _MAX_POINT_VALUES:
         raise CloudReadError(f"holds shape {stored.shape}: expected (N, 3), (H, W, 3) or depth (H, W)")
-    rows = stored[..., :3].reshape(-1, 3).astype(np.float64)  # (N, 3)
-    points = (rows * options.units_m).astype(np.float32)
+    return points_in_body(stored[..., :3], options)
+
+
+def points_in_body(stored: NDArray[Any], options: ReadOptions) -> Points:
+    """Points (..., 3) in metres and in the body frame."""
+    with np.errstate(over="ignore"):  # what overflows is as good as infinite: no return
+        points = (stored.astype(np.float64) * options.units_m).astype(np.float32)
     if options.frame == "optical":
         points = points_from_optical(points)
     return undo_roll(points, options.roll_deg)

@@ -6,6 +6,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from doorstate.clouds.sampling import farthest_point_indices
 from doorstate.errors import CloudContentError
@@ -51,14 +52,13 @@ def prepare_cloud(points: Points, count: int = NUM_POINTS, *, thin: bool = False
     flat = np.asarray(points, dtype=np.float32).reshape(-1, 3)
     if len(flat) == 0:
         raise CloudContentError("the cloud is empty: it holds no points")
-    x, y, z = np.abs(flat).T
-    returned = (x < _NO_RETURN) & (y < _NO_RETURN) & (z < _NO_RETURN)
-    if not returned.any():
-        raise CloudContentError(f"none of the {len(flat)} points was measured: all are NaN or infinite")
-    measured = np.flatnonzero(returned & ((x > 0) | (y > 0) | (z > 0)))
+    measured = np.flatnonzero(is_measured(flat))
     if len(measured) == 0:
+        returned = np.count_nonzero((np.abs(flat) < _NO_RETURN).all(axis=1))
+        if returned == 0:
+            raise CloudContentError(f"none of the {len(flat)} points was measured: all are NaN or infinite")
         raise CloudContentError(
-            f"all {np.count_nonzero(returned)} measured points lie at the origin: the cloud holds no surface"
+            f"all {returned} measured points lie at the origin: the cloud holds no surface"
         )
     clean = flat[measured]
     if len(clean) < MIN_POINTS:
@@ -70,6 +70,15 @@ def prepare_cloud(points: Points, count: int = NUM_POINTS, *, thin: bool = False
             f"too few points: {len(chosen)} distinct of {len(clean)} measured, at least {MIN_POINTS} are needed"
         )
     return PreparedCloud(clean[chosen], measured[chosen])
+
+
+def is_measured(points: Points) -> NDArray[np.bool_]:
+    """Which (..., 3) points are something: not NaN, infinite, beyond all measure or (0, 0, 0)."""
+    x, y, z = (np.abs(points[..., axis]) for axis in range(3))
+    found: NDArray[np.bool_] = (
+        (x < _NO_RETURN) & (y < _NO_RETURN) & (z < _NO_RETURN) & ((x > 0) | (y > 0) | (z > 0))
+    )
+    return found
 
 
 def normalize(points: Points) -> Points:

@@ -8,15 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from doorstate.clouds.preparation import MIN_POINTS
+from doorstate.clouds.preparation import MIN_POINTS, is_measured
 from doorstate.types import Points
 
-_NO_RETURN = 1e6  # as clouds.preparation: some drivers write FLT_MAX where nothing returned
 # Cells of 8 x 8 pixels in a 640 x 480 image: hundredths of a door, tens of pixels to judge by.
 _GRID_ROWS, _GRID_COLUMNS = 60, 80
 _POINTS_PER_CELL = 16  # on average; a flat cloud with fewer has gaps of its own
 _CELL_MEASURED = 1 / 8  # of a cell's pixels; fewer are flying pixels
-_WIDEST_TANGENT = 1.0  # flat clouds are looked at within 45 degrees of straight ahead: no depth camera sees more
+_WIDEST_TANGENT = (
+    1.0  # flat clouds are looked at within 45 degrees of straight ahead: no depth camera sees more
+)
 
 
 @dataclass(frozen=True)
@@ -69,8 +70,7 @@ class Gate:
             fewest = -(-self.min_points // 4)
         else:
             fewest = self.min_points
-        x, y, z = (np.abs(cloud[..., axis]) for axis in range(3))
-        measured = (x < _NO_RETURN) & (y < _NO_RETURN) & (z < _NO_RETURN) & ((x > 0) | (y > 0) | (z > 0))
+        measured = is_measured(cloud)
         points = cloud[measured]
         if len(points) < fewest:
             return f"too few points were measured: at least {self.min_points} are needed"

@@ -186,8 +186,13 @@ def _typical_milliseconds(predictor: Predictor) -> float:
     )  # tangents, 60 degrees
     depth_m = np.minimum(3.0, 1.0 / np.maximum(-up, 0.1))
     scene = (depth_m[..., None] * np.stack((np.ones_like(up), across, up), axis=-1)).astype(np.float32)
-    predictor(scene)
-    return statistics.median(predictor(scene).milliseconds for _ in range(_BUDGET_REPEATS))
+    return median_milliseconds(predictor, [scene], _BUDGET_REPEATS)
+
+
+def median_milliseconds(predictor: Predictor, clouds: Sequence[Points], repeats: int) -> float:
+    """Median time over clouds and repeats, after one call that warms up."""
+    predictor(clouds[0])
+    return statistics.median(predictor(cloud).milliseconds for _ in range(repeats) for cloud in clouds)
 
 
 def packaged_networks() -> list[str]:

@@ -7,9 +7,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from doorstate.rules.base import Answer, Parameters, Rule, measured
+from doorstate.rules.base import Answer, Parameters, Rule
 from doorstate.rules.planes import Floats, Plane, angle_deg, fit_plane, pieces, thin
-from doorstate.rules.walls import WallParameters, covered_m, every_other, off_floor, outline, wall_alone
+from doorstate.rules.walls import WallParameters, covered_m, nearby, off_floor, outline, wall_alone
 from doorstate.types import DoorState, Points
 
 
@@ -43,11 +43,9 @@ class AngleBinsRule(Rule[AngleBinsParameters]):
 
     def __call__(self, cloud: Points) -> Answer:
         p = self.parameters
-        coarse = every_other(cloud)
-        points = measured(coarse)
-        if coarse.ndim == 3 and len(points) < p.min_measured_share * coarse.size / 3:
+        points, measured_share = nearby(cloud, p.farthest_m)
+        if measured_share < p.min_measured_share:
             return Answer.none("too few pixels were measured")
-        points = points[np.abs(points).max(axis=1) < p.farthest_m]
         if len(points) < p.min_leaf_points:
             return Answer.none("too few points")
         points = thin(points, p.voxel_m)

@@ -7,8 +7,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from doorstate.rules.base import Answer, Parameters, Rule, Shape, measured
+from doorstate.rules.base import Answer, Parameters, Rule, Shape
 from doorstate.rules.planes import thin
+from doorstate.rules.walls import nearby
 from doorstate.types import DoorState, Points
 
 
@@ -42,11 +43,9 @@ class DepthRegionRule(Rule[DepthRegionParameters]):
 
     def __call__(self, cloud: Points) -> Answer:
         p = self.parameters
-        coarse = cloud[::2, ::2] if cloud.ndim == 3 else cloud
-        points = measured(coarse)
-        if coarse.ndim == 3 and len(points) < p.min_measured_share * coarse.size / 3:
+        points, measured_share = nearby(cloud, p.farthest_m)
+        if measured_share < p.min_measured_share:
             return Answer.none("too few pixels were measured")
-        points = points[np.abs(points).max(axis=1) < p.farthest_m]
         if len(points) < p.min_points:
             return Answer.none("too few points")
         points = thin(points, p.voxel_m)

@@ -8,9 +8,9 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from doorstate.rules.base import Answer, Parameters, Rule, measured
+from doorstate.rules.base import Answer, Parameters, Rule
 from doorstate.rules.planes import Floats, Plane, angle_deg, fit_plane, normals, pieces, thin
-from doorstate.rules.walls import WallParameters, covered_m, every_other, outline, wall_alone
+from doorstate.rules.walls import WallParameters, covered_m, nearby, outline, wall_alone
 from doorstate.types import DoorState, Points
 
 
@@ -80,8 +80,7 @@ class PlaneStateRule(Rule[PlaneStateParameters]):
 
     def __call__(self, cloud: Points) -> Answer:
         p = self.parameters
-        points = measured(every_other(cloud))
-        points = points[np.abs(points).max(axis=1) < p.farthest_m]
+        points, _ = nearby(cloud, p.farthest_m)
         if len(points) < p.min_points:
             return Answer.none("too few points")
         points = thin(points, p.voxel_m)

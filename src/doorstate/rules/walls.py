@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from doorstate.rules.base import Answer, Parameters, Shape
+from doorstate.rules.base import Answer, Parameters, Shape, measured
 from doorstate.rules.planes import Flags, Floats, Plane
 from doorstate.types import DoorState, Points
 
@@ -79,6 +79,18 @@ def wall_alone(wall: Plane, points: Floats, parameters: WallParameters) -> Answe
         if ahead[run].any() and len(run) * p.bin_m >= p.unbroken_m:
             return Answer(DoorState.CLOSED, opening_angle_deg=0.0, found=(shape,))
     return Answer.none("one plane, neither unbroken in the middle nor with a void to see through", shape)
+
+
+def nearby(cloud: Points, farthest_m: float) -> tuple[Floats, float]:
+    """(M, 3) measured points of every other pixel within a range, and which share of these pixels was measured.
+
+    The share is taken before the range; of a flat cloud it is 1.
+    """
+    coarse = every_other(cloud)
+    points = measured(coarse)
+    pixels = coarse.size / 3 if coarse.ndim == 3 else 0
+    share = len(points) / pixels if pixels else 1.0
+    return points[np.abs(points).max(axis=1) < farthest_m], share
 
 
 def every_other(cloud: Points) -> Points:

@@ -39,9 +39,8 @@ class Experiment(BaseModel):
     recipe: str = "common"
     recipe_changes: dict[str, Any] = {}  # fields of the recipe that differ
     network_changes: dict[str, dict[str, Any]] = {}  # for one network, over recipe_changes
-    start_from: str | None = (
-        None  # a comparison whose weights of the same network and fold the runs go on from
-    )
+    # A comparison whose weights of the same network and fold the runs go on from.
+    start_from: str | None = None
 
     def recipe_of(self, network: str) -> Recipe:
         """The recipe of a network, changes applied.
@@ -54,7 +53,7 @@ class Experiment(BaseModel):
         try:
             return Recipe.model_validate(recipe.model_dump() | changes)
         except ValidationError as error:
-            raise ConfigError(f"experiment {self.name}: recipe_changes: {_first(error)}") from error
+            raise ConfigError(f"experiment {self.name}: recipe_changes: {first_problem(error)}") from error
 
     @property
     def methods(self) -> tuple[str, ...]:
@@ -100,17 +99,13 @@ def load_experiment(path: Path | None, overrides: Mapping[str, Any]) -> Experime
     """
     values: dict[str, Any] = {}
     if path is not None:
-        try:
-            values = tomllib.loads(path.read_text(encoding="utf-8"))
-        except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-            raise ConfigError(f"{path}: cannot be read as an experiment ({error})") from error
-        values.setdefault("name", path.stem)
+        values = {"name": path.stem} | read_toml(path, "an experiment")
     given = dict(overrides)
     wanted = given.pop("recipe_changes", {})
     try:
         experiment = Experiment.model_validate(values | given)
     except ValidationError as error:
-        raise ConfigError(f"{path or 'options'}: {_first(error)}") from error
+        raise ConfigError(f"{path or 'options'}: {first_problem(error)}") from error
     experiment = experiment.model_copy(
         update={
             "recipe_changes": experiment.recipe_changes | wanted,
@@ -119,6 +114,14 @@ def load_experiment(path: Path | None, overrides: Mapping[str, Any]) -> Experime
     )
     experiment.check()
     return experiment
+
+
+def read_toml(path: Path, what: str) -> dict[str, Any]:
+    """Content of a TOML file; ConfigError unless it is one."""
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise ConfigError(f"{path}: cannot be read as {what} ({error})") from error
 
 
 def runs_of(experiment: Experiment, folder: Path) -> list[Run]:
@@ -229,7 +232,8 @@ def _run_piece(piece: _Piece, path: Path) -> None:
         run(piece.experiment, path.parent, dataset, piece.network, piece.fold, piece.folder / "splits.csv")
 
 
-def _first(error: ValidationError) -> str:
+def first_problem(error: ValidationError) -> str:
+    """Where and what, in one line."""
     problem = error.errors()[0]
     where: Sequence[Any] = problem["loc"]
     return f"{'.'.join(str(step) for step in where)}: {problem['msg']}"

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any
@@ -13,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from doorstate.clouds.preparation import MIN_POINTS
 from doorstate.errors import ConfigError
 from doorstate.networks import list_networks
-from doorstate.training.comparison import Experiment
+from doorstate.training.comparison import Experiment, first_problem, read_toml
 
 AS_TRAINED, FINE_TUNED = "as-trained", "fine-tuned"
 
@@ -65,14 +64,9 @@ def load_study(path: Path) -> ResolutionStudy:
         ConfigError: missing, no TOML, or an unknown or wrong value.
     """
     try:
-        values = tomllib.loads(path.read_text(encoding="utf-8"))
-        study = ResolutionStudy.model_validate({"name": path.stem} | values)
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise ConfigError(f"{path}: cannot be read as a study ({error})") from error
+        study = ResolutionStudy.model_validate({"name": path.stem} | read_toml(path, "a study"))
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
-        raise ConfigError(f"{path}: {where}: {first['msg']}") from error
+        raise ConfigError(f"{path}: {first_problem(error)}") from error
     for _, experiment in study.experiments():
         experiment.check()
     return study

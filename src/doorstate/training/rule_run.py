@@ -65,11 +65,11 @@ def answer(
         index = dataset.index_of(sample)
         cloud = dataset.raw_cloud(index)
         before = time.perf_counter()
-        answer = rule(cloud)
+        given = rule(cloud)
         milliseconds.append(1000 * (time.perf_counter() - before))
-        rows.append(_row(sample, dataset.rows[index]["state"], answer))
+        rows.append(_row(sample, dataset.rows[index]["state"], given))
         if rows[-1]["state"] != rows[-1]["predicted"]:
-            shapes = [[shape.name, np.round(shape.points_m, 3).tolist()] for shape in answer.found]
+            shapes = [[shape.name, np.round(shape.points_m, 3).tolist()] for shape in given.found]
             found.append(json.dumps({"sample_id": sample, "found": shapes}))
         if time.perf_counter() - told > _TELL_EVERY_S:
             told = time.perf_counter()
