@@ -19,6 +19,7 @@ import doorstate
 from doorstate.clouds.pcd import write_pcd
 from doorstate.dataset.store import PreparedDataset
 from doorstate.networks import create_network, list_networks
+from doorstate.rules import list_rules
 from doorstate.training.weights import WeightsCard, save_weights
 
 Run = Callable[..., tuple[int, str, str]]
@@ -74,6 +75,12 @@ def test_info_names_versions_and_networks(run: Run) -> None:
     assert [entry["network"] for entry in found["networks"]] == list_networks()
     assert {entry["parameters"] for entry in found["networks"]} >= {3_470_540, 1_466_179}
     assert run("info")[0] == 0
+
+
+def test_info_lists_the_rules(run: Run) -> None:
+    assert json.loads(run("info", "--json")[1])["rules"] == list_rules()
+    out = run("info")[1]
+    assert all(name in out for name in list_rules())
 
 
 def test_predict_prints_a_table(run: Run, weights: Path, cloud: np.ndarray, tmp_path: Path) -> None:

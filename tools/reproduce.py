@@ -118,7 +118,7 @@ def build(root: Path) -> None:
         write_everything(folder, root / "results" / folder.name / "report", ROWS)
     if (RESULTS / "resolution").is_dir():
         write_resolution(RESULTS / "resolution", root / "results" / "resolution" / "report", ROWS)
-    write_page(RESULTS, ROWS, root / PAGE)
+    write_page(RESULTS, ROWS, root / "results", root / PAGE)
 
 
 def check() -> str | None:

@@ -12,13 +12,11 @@ from pathlib import Path
 import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from doorstate.dataset.store import PreparedDataset, open_dataset
 from doorstate.evaluation.metrics import Scores, scores
 from doorstate.evaluation.resolution import load_resolution, resolution_table
 from doorstate.evaluation.results import ComparisonResults, load_results
 from doorstate.evaluation.score_tables import pooled_confusion
 from doorstate.evaluation.table import UNDEFINED, Table, number
-from doorstate.evaluation.tables import build_tables
 from doorstate.files import write_text
 from doorstate.training.comparison import run_of
 from doorstate.training.run_folder import read_json
@@ -39,7 +37,7 @@ class Published:
     """One comparison as the page speaks of it."""
 
     results: ComparisonResults
-    tables: dict[str, Table]
+    tables: dict[str, str]  # Markdown, by name
     scores: dict[str, Scores]  # pooled, by network
     confusion: dict[str, np.ndarray]
 
@@ -69,18 +67,22 @@ class Published:
         return int(row[STATES.index(state)]), int(row.sum())
 
 
-def write_page(results_folder: Path, rows_folder: Path, page: Path) -> None:
+def write_page(results_folder: Path, rows_folder: Path, reports_folder: Path, page: Path) -> None:
     """Render the page.
 
     Args:
         results_folder: holds one folder for each published experiment.
         rows_folder: the data set, rows alone.
+        reports_folder: holds `<experiment>/report` of each complete one, made before.
         page: the file to write.
     """
-    dataset = open_dataset(rows_folder)
     folders = [path.parent for path in sorted(results_folder.glob("*/comparison.json"))]
     waiting = {folder.name: unfinished_runs(folder) for folder in folders}
-    published = {folder.name: _published(folder, dataset) for folder in folders if not waiting[folder.name]}
+    published = {
+        folder.name: _published(folder, rows_folder, reports_folder)
+        for folder in folders
+        if not waiting[folder.name]
+    }
     resolution = results_folder / "resolution"
     environment = Environment(
         loader=FileSystemLoader(Path(__file__).parent),
@@ -98,7 +100,6 @@ def write_page(results_folder: Path, rows_folder: Path, page: Path) -> None:
         resolution=_table(resolution_table(load_resolution(resolution, rows_folder)))
         if resolution.is_dir()
         else None,
-        table=_table,
         percent=lambda value, digits=2: f"{100 * value:.{digits}f} %",
     )
     write_text(page, re.sub(r"\n{3,}", "\n\n", text).strip() + "\n")
@@ -149,12 +150,13 @@ def budget_table(published: list[Published]) -> Table:
     return Table("What the runs cost", columns, tuple(rows), note, text_columns=2)
 
 
-def _published(folder: Path, dataset: PreparedDataset) -> Published:
-    results = load_results(folder, dataset.folder)
+def _published(folder: Path, rows_folder: Path, reports_folder: Path) -> Published:
+    results = load_results(folder, rows_folder)
+    tables = reports_folder / folder.name / "report" / "tables"
     confusion = {network: pooled_confusion(results, network) for network in results.networks}
     return Published(
         results,
-        build_tables(results, dataset),
+        {path.stem: path.read_text(encoding="utf-8").strip() for path in tables.glob("*.md")},
         {network: scores(counts) for network, counts in confusion.items()},
         confusion,
     )

@@ -95,7 +95,7 @@ def predict(
 
 
 def info(as_json: Annotated[bool, typer.Option("--json", help="As one JSON object.")] = False) -> None:
-    """Versions, networks, packaged weights and what this machine offers.
+    """Versions, networks, packaged weights, rules and what this machine offers.
 
     \b
     Examples:
@@ -106,6 +106,7 @@ def info(as_json: Annotated[bool, typer.Option("--json", help="As one JSON objec
     from doorstate.console import print_table
     from doorstate.deployment.predictor import packaged_networks
     from doorstate.networks import create_network, list_networks
+    from doorstate.rules import create_rule, list_rules
     from doorstate.training.environment import describe_environment
 
     environment = describe_environment() | {"fpsample": HAS_FPSAMPLE}
@@ -116,11 +117,12 @@ def info(as_json: Annotated[bool, typer.Option("--json", help="As one JSON objec
     ]
     if as_json:
         listed = [{"network": n, "parameters": p, "packaged_weights": w} for n, p, w in networks]
-        print(json.dumps(environment | {"networks": listed}))  # noqa: T201
+        print(json.dumps(environment | {"networks": listed, "rules": list_rules()}))  # noqa: T201
         return
     print_table("", ["", "value"], [[name, str(value)] for name, value in environment.items()])
     rows = [[name, f"{count:,}", "yes" if weights else "no"] for name, count, weights in networks]
     print_table("", ["network", "parameters", "weights in the package"], rows)
+    print_table("", ["rule", "after"], [[name, create_rule(name).source] for name in list_rules()])
 
 
 def _predict_files(predictor: Any, paths: list[Path], options: ReadOptions, as_json: bool) -> None:
