@@ -12,6 +12,7 @@ from doorstate.networks import create_network, list_networks
 from doorstate.networks.base import PointNetwork
 from doorstate.networks.layers import RowBatchNorm
 from doorstate.networks.point2sequence import Point2Sequence
+from doorstate.networks.pointcnn import PointCNN
 from doorstate.networks.pointnet2 import PointNet2
 
 NAMES = ("pointnet", "pointnet2", "dgcnn", "pointcnn", "point2sequence")
@@ -143,7 +144,7 @@ def test_fewer_centres_are_the_first_and_come_back(network: PointNetwork) -> Non
         half = network.features(points)
         network.use_centres(1.0)
         torch.testing.assert_close(network.features(points), whole)
-    has_centres = isinstance(network, PointNet2 | Point2Sequence)
+    has_centres = isinstance(network, PointNet2 | PointCNN | Point2Sequence)
     assert torch.equal(half, whole) != has_centres
     if isinstance(network, Point2Sequence):
         assert (half <= whole).all(), "a maximum over fewer areas"

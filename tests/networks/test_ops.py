@@ -9,7 +9,13 @@ import torch
 from torch import Tensor
 from twins import assert_same, rows
 
-from doorstate.networks.ops import gather_rows, max_over_points, neighbour_max, neighbour_sum
+from doorstate.networks.ops import (
+    gather_rows,
+    max_over_points,
+    neighbour_max,
+    neighbour_sum,
+    weigh_neighbours,
+)
 
 
 def neighbours(batch: int, queries: int, points: int, k: int) -> Tensor:
@@ -36,6 +42,16 @@ def test_neighbour_max_is_the_maximum_of_gathered_rows(ties: bool) -> None:
         values = values.round()
     assert_same(lambda x: neighbour_max(x, indices), lambda x: plain.gather(x, indices).max(2).values, values)
     assert torch.equal(neighbour_max(values, indices), plain.gather(values, indices).amax(2))
+
+
+@pytest.mark.parametrize("multiples", [1, 3])
+def test_weighed_neighbours_are_a_sum_of_products(multiples: int) -> None:
+    assert_same(
+        weigh_neighbours,
+        lambda x, weight: torch.einsum("bpkc,kcm->bpmc", x, weight),
+        rows(2, 6, 4, 5),
+        rows(4, 5, multiples, seed=1),
+    )
 
 
 @pytest.mark.parametrize("count", [1, 32, 127, 128, 300])

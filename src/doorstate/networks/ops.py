@@ -65,6 +65,16 @@ def neighbour_max(values: Tensor, indices: Tensor) -> Tensor:
     return _max_neighbours(values, indices)
 
 
+def weigh_neighbours(rows: Tensor, weight: Tensor) -> Tensor:
+    """Sum over the neighbours of each channel: (B, P, m, C) of (B, P, K, C) rows and (K, C, m) weights.
+
+    One pass over the rows in their order; as a product per channel it would transpose them first.
+    """
+    if torch.compiler.is_exporting():
+        return torch.einsum("bpkc,kcm->bpmc", rows, weight)
+    return _weigh_neighbours(rows, weight)
+
+
 def max_over_points(values: Tensor) -> Tensor:
     """Maximum over the axis before the last; its gradient goes to the first point that has it."""
     if torch.compiler.is_exporting() or not wants_gradient(values):
@@ -176,6 +186,37 @@ class _NeighbourSum(torch.autograd.Function):
         return spread.view(ctx.shape), None
 
 
+class _WeighNeighbours(torch.autograd.Function):
+    @staticmethod
+    def forward(ctx: Any, rows: Tensor, weight: Tensor) -> Tensor:
+        ctx.save_for_backward(rows, weight)
+        flat = rows.flatten(0, 1)
+        out = weight.new_zeros(len(flat), weight.shape[2], weight.shape[1])
+        for slot, weights in enumerate(weight):
+            row = at_least_float32(flat[:, slot])
+            for multiple, column in enumerate(weights.unbind(1)):
+                out[:, multiple].addcmul_(row, column)
+        return out.view(*rows.shape[:2], *out.shape[1:]).to(rows.dtype)
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx: Any, grad: Tensor) -> tuple[Tensor, Tensor]:
+        rows, weight = ctx.saved_tensors
+        flat = rows.flatten(0, 1)
+        grads = [each.contiguous() for each in at_least_float32(grad.flatten(0, 1)).unbind(1)]
+        of_rows, of_weight = torch.empty_like(flat), torch.empty_like(weight)
+        product = torch.empty_like(grads[0])
+        for slot, weights in enumerate(weight):
+            row = at_least_float32(flat[:, slot])
+            for multiple, each in enumerate(grads):
+                of_weight[slot, :, multiple] = torch.mul(each, row, out=product).sum(0)
+            product.zero_()
+            for column, each in zip(weights.unbind(1), grads, strict=True):
+                product.addcmul_(each, column)
+            of_rows[:, slot] = product
+        return of_rows.view_as(rows), of_weight
+
+
 class _MaxOverPoints(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, values: Tensor) -> Tensor:
@@ -199,4 +240,5 @@ class _MaxOverPoints(torch.autograd.Function):
 
 _sum_neighbours: Callable[[Tensor, Tensor], Tensor] = _NeighbourSum.apply
 _max_neighbours: Callable[[Tensor, Tensor], Tensor] = _NeighbourMax.apply
+_weigh_neighbours: Callable[[Tensor, Tensor], Tensor] = _WeighNeighbours.apply
 _max_points: Callable[[Tensor], Tensor] = _MaxOverPoints.apply

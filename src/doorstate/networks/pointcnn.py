@@ -7,7 +7,7 @@ Every layer is linear, then ELU, then batch normalisation, without bias except t
 from __future__ import annotations
 
 from math import sqrt
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import torch
 from torch import Tensor, nn
@@ -15,7 +15,7 @@ from torch.nn import functional
 
 from doorstate.networks.base import Neighbourhoods, PointNetwork
 from doorstate.networks.layers import PointLinear, RowBatchNorm, set_batchnorm
-from doorstate.networks.ops import at_least_float32, full_precision, gather_rows
+from doorstate.networks.ops import at_least_float32, full_precision, gather_rows, weigh_neighbours
 from doorstate.networks.search import knn
 
 
@@ -29,6 +29,9 @@ class Level(NamedTuple):
 
 
 LEVELS = (Level(8, 1, None, 48), Level(12, 2, 384, 96), Level(16, 2, 128, 192), Level(16, 3, 128, 384))
+_MOST_VALUES_AT_ONCE = (
+    2048  # of one neighbourhood; the first three levels have 192, 720 and 1920, the last 3840
+)
 
 
 def _elu_dense(linear: nn.Linear) -> nn.Sequential:
@@ -37,13 +40,29 @@ def _elu_dense(linear: nn.Linear) -> nn.Sequential:
 
 
 def _depthwise(rows: Tensor, weight: Tensor) -> Tensor:
-    """Contract the neighbours of each channel: (B, P, K, C) with weight (K, C, m) to (B, P, C, m)."""
+    """Contract one axis of each matrix: (B, P, K, C) with weight (K, C, m) to (B, P, C, m)."""
     return torch.einsum("bpkc,kcm->bpcm", rows, weight)
 
 
 def _depthwise_weight(k: int, channels: int, multiplier: int) -> nn.Parameter:
     std = sqrt(2 / (k * channels + k * multiplier))  # Glorot-normal, fans counted as TensorFlow does
     return nn.Parameter(torch.randn(k, channels, multiplier) * std)
+
+
+def _separable(rows: Tensor, depthwise: Tensor, pointwise: nn.Linear) -> Tensor:
+    """Weigh the neighbours of each channel, then mix the channels: (B, P, K, C) to (B, P, C_out).
+
+    Nothing comes between the two, so few channels take both in one product; with many that is more arithmetic
+    than the passes over memory that it saves.
+    """
+    k, channels, multiplier = depthwise.shape
+    mixing = pointwise.weight.view(-1, channels, multiplier)
+    if k * channels <= _MOST_VALUES_AT_ONCE:
+        with full_precision(rows):
+            weight = torch.einsum("kcm,ocm->okc", depthwise, mixing)
+        return functional.linear(rows.flatten(2), weight.flatten(1))
+    weighed = weigh_neighbours(rows, depthwise)  # (B, P, m, C)
+    return functional.linear(weighed.flatten(2), mixing.transpose(1, 2).flatten(1))
 
 
 class XTransform(nn.Module):
@@ -76,6 +95,7 @@ class XConv(nn.Module):
     def __init__(self, level: Level, num_features: int, with_global: bool = False) -> None:
         super().__init__()
         self.k, self.dilation, self.num_representatives, channels = level
+        self.all_representatives = self.num_representatives
         lifted = num_features // 4 if num_features else channels // 2
         multiplier = -(-channels // num_features) if num_features else 4
         self.lift = nn.Sequential(
@@ -116,7 +136,8 @@ class XConv(nn.Module):
         if features is not None:
             rows = torch.cat([rows, gather_rows(features, indices)], dim=-1)  # (B, P, K, C_lift + F)
         rows = self.transform(offsets) @ rows
-        out = self.pointwise(_depthwise(rows, self.depthwise).flatten(2))  # (B, P, channels)
+        linear, activation, norm = self.pointwise
+        out = norm(activation(_separable(rows, self.depthwise, cast(nn.Linear, linear))))  # (B, P, channels)
         if self.position is not None:
             out = torch.cat([self.position(representatives), out], dim=-1)
         return representatives, out
@@ -162,6 +183,11 @@ class PointCNN(PointNetwork):
         nn.init.xavier_normal_(self.head.weight)
         nn.init.zeros_(self.head.bias)
         set_batchnorm(self, eps=batchnorm_eps)
+
+    def use_centres(self, share: float) -> None:
+        for level in self.levels:
+            if isinstance(level, XConv) and level.all_representatives is not None:
+                level.num_representatives = max(level.k, round(share * level.all_representatives))
 
     def neighbourhoods(self, points: Tensor) -> Neighbourhoods:
         """(B, P, K) neighbours of the representative points of each level."""
