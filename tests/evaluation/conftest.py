@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -97,6 +98,19 @@ def make_comparison(tmp_path: Path) -> MakeComparison:
         return folder
 
     return make
+
+
+@pytest.fixture
+def add_found() -> Callable[..., None]:
+    """Say what a method found in a sample, in the run that tested it."""
+
+    def add(folder: Path, method: str, sample_id: str, found: list[list[Any]]) -> None:
+        for path in (folder / "runs" / method).rglob("predictions.csv"):
+            if f"\n{sample_id}," in path.read_text():
+                record = {"sample_id": sample_id, "found": found}
+                path.with_name("found.jsonl").write_text(json.dumps(record) + "\n")
+
+    return add
 
 
 def _write_run(folder: Path, states: Mapping[str, str], answers: Mapping[str, str]) -> None:

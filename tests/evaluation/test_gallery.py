@@ -70,6 +70,19 @@ def test_far_points_are_kept_at_the_rim(
     assert gallery.cards[0].facts == ()
 
 
+def test_cards_carry_what_a_rule_found(
+    imported: PreparedDataset, make_comparison: Callable[..., Path], add_found: Callable[..., None]
+) -> None:
+    folder = make_comparison(imported, {"dgcnn": {"open/3": "closed"}})
+    add_found(
+        folder, "dgcnn", "open/3", [["wall", [[2, 1, 0], [2, -1, 0], [2, -1, 1]]], ["corner", [[1, 0, 0]]]]
+    )
+    gallery = build_gallery(load_results(folder), imported)
+    outline, corner = gallery.shapes["open/3"]["dgcnn"]
+    assert outline == {"name": "wall", "points": [[2, 1, 0], [2, -1, 0], [2, -1, 1], [2, 1, 0]]}  # closed
+    assert corner == {"name": "corner", "points": [[1, 0, 0]]}
+
+
 def test_the_surest_errors_are_kept_and_the_rest_counted(
     imported: PreparedDataset, make_comparison: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:

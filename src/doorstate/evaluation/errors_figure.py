@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from doorstate.dataset.store import PreparedDataset
+from doorstate.evaluation.found_shapes import draw_shapes
 from doorstate.evaluation.gallery import order_of_errors
 from doorstate.evaluation.results import ComparisonResults, ErrorRow
 from doorstate.evaluation.samples_figure import draw_cloud
@@ -33,6 +34,7 @@ def surest_errors_figure(results: ComparisonResults, dataset: PreparedDataset) -
         for column, error in enumerate(errors):
             title = f"{_SHORT[error.state]} as {_SHORT[error.predicted]}, {error.confidence:.2f}"
             _draw(axes[2 * line][column], axes[2 * line + 1][column], dataset, error, title)
+            draw_shapes(axes[2 * line + 1][column], results.shapes(network, error.sample_id))
     return figure
 
 

@@ -8,12 +8,14 @@ import io
 from collections import Counter, defaultdict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
 from doorstate.dataset.store import PreparedDataset
+from doorstate.evaluation.found_shapes import encode_shapes
 from doorstate.evaluation.results import ComparisonResults, ErrorRow
 from doorstate.evaluation.stratum_tables import is_undecidable
 from doorstate.types import Points
@@ -41,6 +43,7 @@ class Gallery:
 
     cards: tuple[Card, ...]
     clouds: Mapping[str, Mapping[str, str | None]]
+    shapes: Mapping[str, Mapping[str, list[dict[str, Any]]]]  # by sample and method
     left_out: Mapping[str, int]
 
 
@@ -66,6 +69,7 @@ def build_gallery(results: ComparisonResults, dataset: PreparedDataset) -> Galle
     return Gallery(
         cards=tuple(_card(dataset, rows[name], tuple(by_sample[name])) for name in order),
         clouds={name: _encode_cloud(dataset, dataset.index_of(name)) for name in order},
+        shapes={name: _shapes(results, by_sample[name]) for name in order},
         left_out={network: left_out[network] for network in results.networks},
     )
 
@@ -90,6 +94,11 @@ def _card(dataset: PreparedDataset, row: Mapping[str, str], answers: tuple[Error
         None if picture is None else _picture_uri(picture),
         answers,
     )
+
+
+def _shapes(results: ComparisonResults, errors: list[ErrorRow]) -> dict[str, list[dict[str, Any]]]:
+    found = {error.network: results.shapes(error.network, error.sample_id) for error in errors}
+    return {method: encode_shapes(shapes) for method, shapes in found.items() if shapes}
 
 
 def _facts(row: Mapping[str, str]) -> list[str]:

@@ -28,7 +28,13 @@ from doorstate.evaluation.results import ComparisonResults, load_results
 from doorstate.evaluation.score_tables import answers_given, pooled_confusion
 from doorstate.evaluation.table import Table
 from doorstate.evaluation.tables import build_tables, dataset_tables, save_tables, write_tables
-from doorstate.evaluation.views import PART_COLORS, STATE_COLORS, VIEW_AZIMUTH_RAD, VIEW_ELEVATION_RAD
+from doorstate.evaluation.views import (
+    PART_COLORS,
+    SHAPE_COLORS,
+    STATE_COLORS,
+    VIEW_AZIMUTH_RAD,
+    VIEW_ELEVATION_RAD,
+)
 from doorstate.files import write_text
 from doorstate.types import STATES, Part
 
@@ -131,9 +137,20 @@ def render_report(
         states=STATES,
         answers=answers_given(results),
         state_colors=STATE_COLORS,
+        shape_colors=SHAPE_COLORS,
+        shape_names=sorted(
+            {
+                s["name"]
+                for by_method in gallery.shapes.values()
+                for found in by_method.values()
+                for s in found
+            }
+        ),
         gallery=gallery,
         page_data={
             "clouds": gallery.clouds,
+            "shapes": gallery.shapes,
+            "shape_colors": SHAPE_COLORS,
             "parts": [
                 {"value": part, "name": part.name.lower(), "color": PART_COLORS[part]} for part in Part
             ],

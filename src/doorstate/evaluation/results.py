@@ -16,7 +16,9 @@ from pydantic import TypeAdapter, ValidationError
 from doorstate.dataset.splits import Role, read_splits
 from doorstate.dataset.store import MANIFEST
 from doorstate.errors import DatasetError, RunError
+from doorstate.evaluation.found_shapes import Found, read_found
 from doorstate.evaluation.metrics import Floats
+from doorstate.rules.base import Shape
 from doorstate.simulation.manifest import read_csv
 from doorstate.training.comparison import run_of
 from doorstate.training.run_folder import RunFolder, read_json
@@ -77,6 +79,7 @@ class Run:
     log: Mapping[str, Floats]
     environment: Mapping[str, Any]
     validation: Predictions | None = None
+    found: Found = field(default_factory=dict)  # of a rule, where it was wrong
 
     def metric(self, name: str) -> float:
         """A number of `metrics.json`, NaN where the run did not record it."""
@@ -139,6 +142,10 @@ class ComparisonResults:
             np.concatenate([part.angles_deg for part in parts]),
             tuple(reason for part in parts for reason in part.reasons),
         )
+
+    def shapes(self, network: str, sample_id: str) -> tuple[Shape, ...]:
+        """What a rule found in a sample; nothing of a network, or where the answer was right."""
+        return tuple(shape for run in self.runs_of(network) for shape in run.found.get(sample_id, ()))
 
     def role_counts(self, fold: int) -> Counter[str]:
         """Number of samples in each role of one fold."""
@@ -218,6 +225,7 @@ def _read_run(folder: RunFolder, network: str, fold: int) -> Run:
         _read_log(folder.log) if folder.log.exists() else {},
         read_json(folder.environment) if folder.environment.exists() else {},
         _read_predictions(folder.validation, fold) if folder.validation.exists() else None,
+        read_found(folder.found),
     )
 
 

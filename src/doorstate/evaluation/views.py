@@ -28,6 +28,15 @@ NETWORK_COLORS = {
     "pointcnn": "#CC79A7",
     "point2sequence": "#E69F00",
 }
+# What rules find, over clouds in the colours of their parts.
+SHAPE_COLORS = {
+    "wall": "#0072B2",
+    "leaf": "#B3202C",
+    "opening": "#00A651",
+    "surface": "#B3202C",
+    "edge": "#111111",
+    "corner": "#111111",
+}
 PART_COLORS = {
     Part.WALL: "#A9B1BC",
     Part.FRAME: "#7B4FA3",

@@ -48,8 +48,13 @@
     return Array.from(z, (value) => `hsl(${260 - (200 * (value - low)) / (high - low || 1)} 70% 42%)`);
   }
 
+  // What rules found in a sample: [method, { name, points }] in the order of the answers.
+  const shapesOf = (sample) =>
+    Object.entries(data.shapes[sample]).flatMap(([method, shapes]) => shapes.map((shape) => [method, shape]));
+  const shapeColor = (name) => data.shape_colors[name] || data.shape_colors.edge;
+
   // The same oblique view as Figure 2: from behind and above the camera, near points last.
-  function preview(canvas, cloud) {
+  function preview(canvas, cloud, shapes) {
     const { azimuth: a, elevation: e } = data.view;
     const forward = [Math.cos(e) * Math.cos(a), Math.cos(e) * Math.sin(a), -Math.sin(e)];
     const right = [Math.sin(a), -Math.cos(a), 0];
@@ -71,12 +76,24 @@
         width / 2 + zoom * (u[i] - (left + rightmost) / 2), height / 2 - zoom * (v[i] - (bottom + top) / 2), size, size,
       );
     }
+    const dot = (p, d) => p[0] * d[0] + p[1] * d[1] + p[2] * d[2];
+    const place = (p) => [
+      width / 2 + zoom * (dot(p, right) - (left + rightmost) / 2), height / 2 - zoom * (dot(p, up) - (bottom + top) / 2),
+    ];
+    pen.lineWidth = 1.5 * scale;
+    for (const [, { name, points }] of shapes) {
+      pen.strokeStyle = pen.fillStyle = shapeColor(name);
+      pen.beginPath();
+      if (points.length === 1) pen.arc(...place(points[0]), 2.5 * scale, 0, 2 * Math.PI), pen.fill();
+      else points.forEach((p, k) => (k ? pen.lineTo(...place(p)) : pen.moveTo(...place(p)))), pen.stroke();
+    }
   }
 
   const whenSeen = new IntersectionObserver((entries) => {
     for (const entry of entries.filter((e) => e.isIntersecting && e.target.clientWidth)) {
       whenSeen.unobserve(entry.target);
-      preview(entry.target, decode(entry.target.closest(".card").dataset.sample));
+      const { sample } = entry.target.closest(".card").dataset;
+      preview(entry.target, decode(sample), shapesOf(sample));
     }
   }, { rootMargin: "300px" });
   document.querySelectorAll(".cloud canvas").forEach((canvas) => whenSeen.observe(canvas));
@@ -99,7 +116,8 @@
 
   function open(button) {
     needPlotly();
-    const cloud = decode(button.closest(".card").dataset.sample);
+    const { sample } = button.closest(".card").dataset;
+    const cloud = decode(sample);
     const pick = (values, members) => members.map((i) => values[i]);
     const traces = groupsOf(cloud).map(({ name, color, members }) => ({
       type: "scatter3d", mode: "markers", name, hovertemplate: "x %{x:.2f}, y %{y:.2f}, z %{z:.2f} m",
@@ -110,6 +128,14 @@
       type: "scatter3d", mode: "markers", name: "camera", hovertemplate: "camera",
       x: [0], y: [0], z: [0], marker: { size: 5, symbol: "diamond", color: "#d62728" },
     });
+    for (const [method, { name, points }] of shapesOf(sample)) {
+      const [color, title] = [shapeColor(name), `${method}: ${name}`];
+      traces.push({
+        type: "scatter3d", mode: points.length === 1 ? "markers" : "lines", name: title, hovertemplate: title,
+        x: points.map((p) => p[0]), y: points.map((p) => p[1]), z: points.map((p) => p[2]),
+        line: { color, width: 5 }, marker: { size: 4, color },
+      });
+    }
     const plot = document.createElement("div");
     plot.className = "live";
     button.after(plot);
