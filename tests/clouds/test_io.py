@@ -101,15 +101,18 @@ def test_point_arrays_of_any_number_type(tmp_path: Path, dtype: str) -> None:
     array = np.arange(12).reshape(4, 3).astype(dtype)
     for stored in (array, np.hstack([array, array]), array.reshape(2, 2, 3), np.asfortranarray(array)):
         np.save(tmp_path / "a.npy", stored)
-        np.testing.assert_array_equal(read_cloud(tmp_path / "a.npy"), np.arange(12).reshape(4, 3))
+        points = read_cloud(tmp_path / "a.npy").reshape(-1, 3)
+        np.testing.assert_array_equal(points, np.arange(12).reshape(4, 3))
 
 
-def test_an_organized_array_is_flattened_row_by_row(tmp_path: Path) -> None:
+def test_an_organized_cloud_stays_an_image(tmp_path: Path) -> None:
     grid = np.random.default_rng(0).normal(size=(3, 5, 3)).astype(np.float32)
     grid[1, 2] = NAN
     path = tmp_path / "grid.npy"
     np.save(path, grid)
-    np.testing.assert_array_equal(read_cloud(path), grid.reshape(15, 3))
+    np.testing.assert_array_equal(read_cloud(path), grid)
+    write_pcd(tmp_path / "grid.pcd", grid)
+    np.testing.assert_array_equal(read_cloud(tmp_path / "grid.pcd"), grid)
 
 
 @pytest.mark.parametrize("roll_deg", [0, 90, 180, 270])
@@ -126,8 +129,8 @@ def test_a_depth_image_is_read_from_every_container(tmp_path: Path, name: str, r
     depth_m = DEPTH_MM / 1000
     depth_m[1, 2:4] = NAN  # 0 and 65535 both mean that nothing came back
     points = read_cloud(path, ReadOptions(intrinsics=CAMERA, roll_deg=roll_deg, frame="optical"))
-    np.testing.assert_array_equal(points, depth_to_points(depth_m, CAMERA, roll_deg).reshape(-1, 3))
-    np.testing.assert_array_equal(np.flatnonzero(np.isnan(points[:, 0])), [22, 23])
+    np.testing.assert_array_equal(points, depth_to_points(depth_m, CAMERA, roll_deg))
+    np.testing.assert_array_equal(np.flatnonzero(np.isnan(points[..., 0])), [22, 23])
 
 
 def test_the_scale_of_stored_depth(tmp_path: Path) -> None:
@@ -135,15 +138,15 @@ def test_the_scale_of_stored_depth(tmp_path: Path) -> None:
     np.save(tmp_path / "metres.npy", np.full((4, 20), 1.25, np.float32))
     np.save(tmp_path / "signed.npy", np.full((4, 20), -1, np.int32))
     tum = ReadOptions(intrinsics=CAMERA, depth_scale_m=1 / 5000)
-    assert set(read_cloud(tmp_path / "integer.npy", tum)[:, 0].tolist()) == {1.0}
-    assert set(read_cloud(tmp_path / "metres.npy", tum)[:, 0].tolist()) == {1.25}
+    assert set(read_cloud(tmp_path / "integer.npy", tum)[..., 0].ravel()) == {1.0}
+    assert set(read_cloud(tmp_path / "metres.npy", tum)[..., 0].ravel()) == {1.25}
     assert np.isnan(read_cloud(tmp_path / "signed.npy", tum)).all()
 
 
 def test_a_narrow_png_is_still_a_depth_image(tmp_path: Path) -> None:
     Image.fromarray(np.full((4, 3), 1000, np.uint16)).save(tmp_path / "narrow.png")
     camera = Intrinsics(3, 4, 1.0, 1.0, 1.0, 1.5)
-    assert read_cloud(tmp_path / "narrow.png", ReadOptions(intrinsics=camera)).shape == (12, 3)
+    assert read_cloud(tmp_path / "narrow.png", ReadOptions(intrinsics=camera)).shape == (4, 3, 3)
 
 
 def test_depth_without_a_camera_names_the_flags(tmp_path: Path, valid: dict[str, bytes]) -> None:
@@ -292,8 +295,8 @@ def test_damaged_files_are_read_or_are_cloud_errors(
             assert _one_line(outcome, path)
         else:
             assert outcome.dtype == np.float32
-            assert outcome.ndim == 2
-            assert outcome.shape[1] == 3
+            assert outcome.ndim in (2, 3)
+            assert outcome.shape[-1] == 3
 
 
 def _points_or_error(path: Path, options: ReadOptions) -> NDArray[np.float32] | CloudError | CameraError:

@@ -30,12 +30,12 @@ def test_every_frame_is_metres_of_a_room() -> None:
         camera = Intrinsics(int(row["width"]), int(row["height"]), *numbers) if numbers else None
         options = ReadOptions(intrinsics=camera, depth_scale_m=float(row["depth_unit_m"] or 1))
         points = read_cloud(REAL / row["file"], options)
-        assert points.shape == ((camera.width * camera.height if camera else 112586), 3)
-        range_m = np.linalg.norm(points, axis=1)
+        assert points.shape == ((camera.height, camera.width, 3) if camera else (112586, 3))
+        range_m = np.linalg.norm(points, axis=-1)
         assert 0.3 < np.nanmedian(range_m) < 10, row["file"]
         assert np.isfinite(range_m).mean() > 0.5, row["file"]
         if camera:
-            assert np.nanmin(points[:, 0]) > 0
+            assert np.nanmin(points[..., 0]) > 0
 
 
 def test_arrays_of_an_unknown_camera_take_a_given_one() -> None:
@@ -43,8 +43,8 @@ def test_arrays_of_an_unknown_camera_take_a_given_one() -> None:
     for row in _rows():
         if row["fx"] == "?":
             points = read_cloud(REAL / row["file"], ReadOptions(intrinsics=camera))
-            assert 0.3 < np.nanmedian(points[:, 0]) < 10
-            assert np.nanmax(points[:, 0]) < 65.5
+            assert 0.3 < np.nanmedian(points[..., 0]) < 10
+            assert np.nanmax(points[..., 0]) < 65.5
 
 
 def test_the_8_bit_image_and_the_colour_image_are_refused() -> None:

@@ -66,14 +66,12 @@ def test_raw_files_are_kept_where_asked(tmp_path: Path) -> None:
         row = unflatten(line)
         frame = replay(row)
         cloud = tmp_path / "pcd" / row.state / f"{row.sample_id}.pcd"
-        np.testing.assert_array_equal(read_cloud(cloud), frame.points.reshape(-1, 3))
+        np.testing.assert_array_equal(read_cloud(cloud), frame.points)
         header = cloud.read_bytes()[:400]
         assert b"WIDTH 640\n" in header
         assert b"HEIGHT 480\n" in header
         depth = tmp_path / "depth" / row.state / f"{row.sample_id}.png"
-        points = read_cloud(depth, ReadOptions(intrinsics=row.camera.intrinsics())).reshape(
-            frame.points.shape
-        )
+        points = read_cloud(depth, ReadOptions(intrinsics=row.camera.intrinsics()))
         assert np.nanmax(np.abs(points[..., 0] - frame.cut.depth_m)) <= 0.5001e-3
         np.testing.assert_array_equal(np.isnan(points[..., 0]), np.isnan(frame.cut.depth_m))
         with Image.open(tmp_path / "image" / row.state / f"{row.sample_id}.png") as picture:

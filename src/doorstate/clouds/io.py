@@ -83,7 +83,7 @@ def read_cloud(path: Path, options: ReadOptions = DEFAULT_OPTIONS) -> Points:
         options: what the file does not say about itself.
 
     Returns:
-        (N, 3) float32 metres, in file order (images and organized clouds row by row), NaN rows kept.
+        (N, 3), or (H, W, 3) of images and organized clouds, float32 metres, in file order, NaN kept.
 
     Raises:
         CloudReadError: when the file cannot be read as what its suffix says.
@@ -101,8 +101,7 @@ def read_cloud(path: Path, options: ReadOptions = DEFAULT_OPTIONS) -> Points:
             warnings.simplefilter("ignore")
             stored = _PARSERS[suffix](data)
             is_depth = suffix == ".png" or (stored.ndim == 2 and stored.shape[1] > _MAX_POINT_VALUES)
-            points = points_from_depth(stored, options) if is_depth else _points_from_rows(stored, options)
-            return points.reshape(-1, 3)
+            return points_from_depth(stored, options) if is_depth else _points_from_rows(stored, options)
     except DoorstateError as error:
         raise type(error)(f"{path.name}: {error}") from error
     except Exception as error:

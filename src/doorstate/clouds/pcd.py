@@ -36,7 +36,7 @@ def parse_pcd(data: bytes) -> NDArray[Any]:
     """Read the fields x, y, z of every point.
 
     Returns:
-        (N, 3) in file order (row by row where organized) and units, NaN kept.
+        (N, 3), or (H, W, 3) of an organized file, in file order and units, NaN kept.
 
     Raises:
         CloudReadError: when the header lacks x, y, z or contradicts itself, or points are missing.
@@ -45,8 +45,12 @@ def parse_pcd(data: bytes) -> NDArray[Any]:
     if header_end is None:
         raise CloudReadError("is no PCD file: the header has no line DATA ascii, binary or binary_compressed")
     encoding = Encoding(header_end[1].decode())
-    metadata = _read_header(data[: header_end.start()].decode("ascii", errors="replace"), encoding)
-    body = data[header_end.end() :]
+    metadata, shape = _read_header(data[: header_end.start()].decode("ascii", errors="replace"), encoding)
+    return _parse_rows(metadata, data[header_end.end() :]).reshape(shape)
+
+
+def _parse_rows(metadata: MetaData, body: bytes) -> NDArray[Any]:
+    encoding = metadata.data
     if metadata.points == 0:
         return np.empty((0, 3), dtype=np.float32)
     if encoding is Encoding.ASCII:
@@ -84,7 +88,8 @@ def write_pcd(path: Path, points: Points) -> None:
         cloud.save(temporary, encoding=Encoding.BINARY_COMPRESSED)
 
 
-def _read_header(text: str, encoding: Encoding) -> MetaData:
+def _read_header(text: str, encoding: Encoding) -> tuple[MetaData, tuple[int, ...]]:
+    """What pypcd4 needs to know, and the shape of the points."""
     entries = {words[0]: words[1:] for line in text.splitlines() if (words := line.split("#")[0].split())}
     fields = entries.get("FIELDS", [])
     if not {"x", "y", "z"} <= set(fields):
@@ -97,7 +102,9 @@ def _read_header(text: str, encoding: Encoding) -> MetaData:
     points = math.prod(int(number) for number in extent)
     # pypcd4 wants every name once: fields other than x, y, z (padding, repeated names) go by their place.
     firsts = {fields.index(axis) for axis in "xyz"}
-    return MetaData.model_validate(
+    height, width = (int(entries.get(name, ["1"])[0]) for name in ("HEIGHT", "WIDTH"))
+    shape = (height, width, 3) if min(height, width) > 1 and height * width == points else (points, 3)
+    metadata = MetaData.model_validate(
         {
             "fields": [name if place in firsts else f"field_{place}" for place, name in enumerate(fields)],
             "size": sizes,
@@ -108,3 +115,4 @@ def _read_header(text: str, encoding: Encoding) -> MetaData:
             "data": encoding,
         }
     )
+    return metadata, shape

@@ -8,18 +8,25 @@ from typing import Any
 
 import numpy as np
 
-from doorstate.deployment.predictor import Prediction
+from doorstate.deployment.gate import Gate
+from doorstate.deployment.predictor import DEFAULT_GATE, Prediction
 from doorstate.errors import CloudContentError
 from doorstate.rules import create_rule
-from doorstate.rules.base import Rule, measured
+from doorstate.rules.base import Answer, Rule, measured
 from doorstate.types import STATES, Points
 
 
 class RulePredictor:
-    """A rule of `doorstate.rules.list_rules()`."""
+    """A rule of `doorstate.rules.list_rules()`.
 
-    def __init__(self, rule: Rule[Any]) -> None:
+    Args:
+        rule: which one.
+        gate: as of a `Predictor`: a rule would take missing data for a free way as well.
+    """
+
+    def __init__(self, rule: Rule[Any], *, gate: Gate | None = DEFAULT_GATE) -> None:
         self.rule = rule
+        self.gate = gate
 
     @classmethod
     def load(cls, name: str) -> RulePredictor:
@@ -43,7 +50,8 @@ class RulePredictor:
         count = len(measured(points))
         if count == 0:
             raise CloudContentError("nothing was measured: the cloud holds no points")
-        answer = self.rule(np.asarray(points))
+        refused = None if self.gate is None else self.gate(points)
+        answer = self.rule(np.asarray(points)) if refused is None else Answer.none(refused)
         return Prediction(
             answer.state,
             {state: float(answer.state is not None and answer.state.label == state) for state in STATES},

@@ -64,14 +64,24 @@ class Recipe(BaseModel):
 # those of `ogurob`, and learning them too took PointNet more than twice as long (ADR 5).
 COMMON = Recipe(name="common", augmentation=Augmentation(yaw_deg=15.0))
 
-# How long each network trains, and on how much of each cloud: what it needs on `ogurob`, from the validation samples of
-# fold 0 (ADR 5). PointNet++ and Point2Sequence spend their time on centres, the others on points.
-_LENGTHS: dict[str, tuple[int, tuple[Stage, ...]]] = {
-    "pointnet": (48, (Stage(share=0.9375, points=512),)),
-    "pointnet2": (8, (Stage(share=0.75, points=1024, centres=0.5),)),
-    "dgcnn": (13, (Stage(share=0.77, points=256), Stage(share=0.077, points=1024))),
-    "pointcnn": (12, (Stage(share=0.84, points=512),)),
-    "point2sequence": (10, (Stage(share=0.8, points=4096, centres=0.25),)),
+
+class _Own(NamedTuple):
+    """What of the common recipe each network has of its own."""
+
+    epochs: int
+    stages: tuple[Stage, ...]
+    batch_size: int = COMMON.batch_size
+    learning_rate: float = COMMON.learning_rate
+
+
+# How long, on how much of each cloud, and how many clouds a step: what each network needs on `ogurob`, from the validation
+# samples of fold 0 (ADR 5). PointNet++ and Point2Sequence spend their time on centres, the others on points.
+_OWN = {
+    "pointnet": _Own(45, (Stage(share=0.667, points=512), Stage(share=0.267, points=1024)), 32, 3e-3),
+    "pointnet2": _Own(8, (Stage(share=0.75, points=1024, centres=0.5),)),
+    "dgcnn": _Own(18, (Stage(share=0.72, points=256), Stage(share=0.22, points=1024)), 32, 3e-3),
+    "pointcnn": _Own(24, (Stage(share=0.75, points=512), Stage(share=0.125, points=1024)), 16, 4e-3),
+    "point2sequence": _Own(10, (Stage(share=0.8, points=4096, centres=0.25),)),
 }
 
 _TENSORFLOW = {
@@ -166,10 +176,10 @@ def find_recipe(name: str, network: str) -> Recipe:
         ConfigError: no such recipe.
     """
     if name == "common":
-        if network not in _LENGTHS:
+        if network not in _OWN:
             return COMMON
-        epochs, stages = _LENGTHS[network]
-        return COMMON.model_copy(update={"epochs": epochs, "coarse_to_fine": stages})
+        own = _OWN[network]._asdict()
+        return COMMON.model_copy(update={"coarse_to_fine": own.pop("stages"), **own})
     if name == "authors" and network in AUTHORS:
         return AUTHORS[network]
     raise ConfigError(f"no recipe {name!r} for {network}: choose common or authors")
