@@ -8,7 +8,8 @@ from typing import ClassVar
 import numpy as np
 
 from doorstate.rules.base import Answer, Parameters, Rule
-from doorstate.rules.planes import Floats, Plane, angle_deg, fit_plane, pieces, thin
+from doorstate.rules.plan_lines import Floats, angle_deg
+from doorstate.rules.planes import Plane, pieces, thin, upright_plane
 from doorstate.rules.walls import WallParameters, covered_m, nearby, off_floor, outline, wall_alone
 from doorstate.types import DoorState, Points
 
@@ -68,7 +69,7 @@ class AngleBinsRule(Rule[AngleBinsParameters]):
     def _planes(self, points: Floats) -> list[tuple[Plane, Floats]]:
         found: list[tuple[Plane, Floats]] = []
         while len(found) < self.parameters.most_planes:
-            fit = fit_plane(points, self.parameters.wall.threshold_m, vertical=True)
+            fit = upright_plane(points, self.parameters.wall.threshold_m)
             if fit is None or fit[1].sum() < self.parameters.min_leaf_points:
                 break
             found.append((fit[0], points[fit[1]]))

@@ -18,8 +18,8 @@ from pydantic import Field
 from scipy.spatial import cKDTree
 
 from doorstate.rules.base import Answer, Parameters, Rule, Shape
-from doorstate.rules.plan_lines import Line, strongest_line
-from doorstate.rules.planes import Flags, Floats, thin
+from doorstate.rules.plan_lines import Flags, Floats, Line, strongest_line
+from doorstate.rules.planes import thin
 from doorstate.types import DoorState, Indices, Points
 
 _MAX_BREAKS = 4  # of a row, that one opening may span; more is a room full of things

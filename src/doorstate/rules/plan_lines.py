@@ -3,11 +3,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from doorstate.rules.planes import Flags, Floats, angle_deg
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 _PAIRS = 400  # a surface with a fifth of the points is hit by 16 of them
 _REFITS = 3
@@ -97,3 +100,8 @@ def fit_line(points: Floats, weights: Floats | None = None) -> Line:
     centre = np.average(points, axis=0, weights=weights)
     scatter = np.cov((points - centre).T, aweights=weights, ddof=0)
     return Line(centre, np.linalg.eigh(scatter)[1][:, 1])
+
+
+def angle_deg(one: Floats, other: Floats) -> float:
+    """Angle between two directions regardless of their signs, 0 to 90 degrees."""
+    return math.degrees(math.acos(min(1.0, abs(float(one @ other)))))

@@ -9,7 +9,8 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from doorstate.rules.base import Answer, Parameters, Rule
-from doorstate.rules.planes import Floats, Plane, angle_deg, fit_plane, normals, pieces, thin
+from doorstate.rules.plan_lines import Floats, angle_deg
+from doorstate.rules.planes import Plane, normals, pieces, thin, upright_plane
 from doorstate.rules.walls import WallParameters, covered_m, nearby, outline, wall_alone
 from doorstate.types import DoorState, Points
 
@@ -26,7 +27,6 @@ class PlaneStateParameters(Parameters):
     # Chosen: noise of normals, half the smallest semi-open angle of the data.
     heading_tolerance_deg: float = 8.0
     most_planes: int = 6  # chosen: wall, leaf, reveals, and a corridor
-    trials: int = 50  # chosen: enough for a plane of a third of the points, 99 times in 100
     min_points: int = 40  # of a plane; chosen: voxels of 0.06 m2
     # Chosen: wider than a reveal, no wider than a single door.
     leaf_width_m: tuple[float, float] = (0.35, 1.25)
@@ -125,7 +125,7 @@ class PlaneStateRule(Rule[PlaneStateParameters]):
             peak = (float(counts.argmax()) + 0.5) * p.heading_bin_deg
             turned = np.abs((heading - peak + 90) % 180 - 90)
             alike = np.flatnonzero(turned <= p.heading_tolerance_deg)
-            fit = fit_plane(points[alike], p.wall.threshold_m, vertical=True, trials=p.trials)
+            fit = upright_plane(points[alike], p.wall.threshold_m)
             if fit is None or fit[1].sum() < p.min_points:
                 break
             found.append(_Surface(fit[0], points[alike[fit[1]]]))

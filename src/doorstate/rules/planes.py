@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Planes in clouds, with scikit-learn and scipy: thinning, normals, robust fits, connected pieces, angles."""
+"""Planes in clouds: upright ones, thinning, normals, connected pieces."""
 
 from __future__ import annotations
 
@@ -10,11 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
-from sklearn.base import BaseEstimator, RegressorMixin
-from sklearn.linear_model import RANSACRegressor
 
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
+from doorstate.rules.plan_lines import Flags, Floats, strongest_line
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,66 +32,23 @@ class Plane:
         return math.atan2(self.normal[1], self.normal[0])
 
 
-class _Surface(RegressorMixin, BaseEstimator):  # type: ignore[misc]
-    """Plane through points for scikit-learn's RANSAC: predicts signed distances, whose targets are zero.
-
-    With `vertical` the plane contains the direction of gravity: a line in plan view.
-    """
-
-    def __init__(self, vertical: bool = False) -> None:
-        self.vertical = vertical
-
-    def fit(self, X: Floats, y: Floats) -> _Surface:
-        columns = 2 if self.vertical else 3
-        centre = X[:, :columns].mean(axis=0)
-        *_, axes = np.linalg.svd(X[:, :columns] - centre, full_matrices=False)
-        normal = np.zeros(3)
-        normal[:columns] = axes[-1] if len(axes) == columns else _across(axes[0])
-        self.normal_ = normal
-        self.offset_ = float(centre @ normal[:columns])
-        return self
-
-    def predict(self, X: Floats) -> Floats:
-        distances: Floats = X @ self.normal_ - self.offset_
-        return distances
-
-    def score(self, X: Floats, y: Floats) -> float:
-        return -float(np.abs(self.predict(X)).mean())
-
-
-def fit_plane(
-    points: Floats, threshold_m: float, *, vertical: bool = False, trials: int = 100, seed: int = 0
-) -> tuple[Plane, Flags] | None:
-    """The plane with most points within a distance (RANSAC, then least squares on those).
+def upright_plane(points: Floats, threshold_m: float, *, seed: int = 0) -> tuple[Plane, Flags] | None:
+    """The plane parallel to gravity with most of (N, 3) points within a distance, and which points (N,) these are.
 
     Args:
         points: (N, 3) metres.
         threshold_m: how far a point of the plane may be from it.
-        vertical: look for planes parallel to gravity only.
-        trials: random samples that are tried.
-        seed: of these samples.
+        seed: of the pairs of points that are tried.
 
     Returns:
-        The plane and which points (N,) lie on it; None where the points do not allow any.
+        None where the points do not allow any.
     """
-    fewest = 2 if vertical else 3
-    if len(points) < fewest:
+    found = strongest_line(points[:, :2], threshold_m, seed=seed)
+    if found is None:
         return None
-    search = RANSACRegressor(
-        _Surface(vertical),
-        min_samples=fewest,
-        residual_threshold=threshold_m,
-        max_trials=trials,
-        random_state=seed,
-    )
-    try:
-        search.fit(points, np.zeros(len(points)))
-    except ValueError:  # no sample with any consensus
-        return None
-    surface = search.estimator_
-    sign = 1.0 if surface.offset_ >= 0 else -1.0
-    plane = Plane(sign * surface.normal_, sign * surface.offset_)
-    return plane, np.abs(plane.distances_m(points)) <= threshold_m
+    line, on_line = found
+    normal = np.append(line.normal, 0.0)
+    return Plane(normal, float(line.normal @ line.centre)), on_line
 
 
 def thin(points: Floats, voxel_m: float) -> Floats:
@@ -129,12 +83,3 @@ def pieces(points: Floats, reach_m: float) -> NDArray[np.int64]:
     rank[order] = np.arange(count)
     ranked: NDArray[np.int64] = rank[label]
     return ranked
-
-
-def angle_deg(one: Floats, other: Floats) -> float:
-    """Angle between two directions regardless of their signs, 0 to 90 degrees."""
-    return math.degrees(math.acos(min(1.0, abs(float(one @ other)))))
-
-
-def _across(direction: Floats) -> Floats:
-    return np.array([-direction[1], direction[0]]) if len(direction) == 2 else np.roll(direction, 1)

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from doorstate.rules.base import Answer, Parameters, Rule, Shape, measured
-from doorstate.rules.plan_lines import Line, fit_line, strongest_line
-from doorstate.rules.planes import Flags, Floats, thin
+from doorstate.rules.plan_lines import Flags, Floats, Line, fit_line, strongest_line
+from doorstate.rules.planes import thin
 from doorstate.types import DoorState, Points
 
 _FEWEST_POINTS = 128  # of a cloud that anything is told from

@@ -9,7 +9,8 @@ import math
 import numpy as np
 
 from doorstate.rules.base import Answer, Parameters, Shape, measured
-from doorstate.rules.planes import Flags, Floats, Plane
+from doorstate.rules.plan_lines import Flags, Floats
+from doorstate.rules.planes import Plane
 from doorstate.types import DoorState, Points
 
 

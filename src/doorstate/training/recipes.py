@@ -74,8 +74,8 @@ class _Own(NamedTuple):
     learning_rate: float = COMMON.learning_rate
 
 
-# How long, on how much of each cloud, and how many clouds a step: what each network needs on `ogurob`, from the validation
-# samples of fold 0 (ADR 5). PointNet++ and Point2Sequence spend their time on centres, the others on points.
+# How long, on how much of each cloud, and how many clouds a step: what each network needs on `ogurob`, from the
+# validation samples of fold 0 (ADR 5). PointNet++ and Point2Sequence spend their time on centres, the others on points.
 _OWN = {
     "pointnet": _Own(45, (Stage(share=0.667, points=512), Stage(share=0.267, points=1024)), 32, 3e-3),
     "pointnet2": _Own(8, (Stage(share=0.75, points=1024, centres=0.5),)),
