@@ -185,6 +185,25 @@ def thinning(
 
 
 @app.command()
+def gate(
+    out: Out,
+    data: Annotated[Path, typer.Option(help="A prepared data set, simulated.")],
+    network: Annotated[str, typer.Option(help="Whose packaged weights.")] = "pointnet2",
+    count: Annotated[int, typer.Option(help="Test clouds, drawn at random.", min=1)] = 100,
+    fold: Annotated[int, typer.Option(help="Of protocol paper.", min=0, max=4)] = 0,
+) -> None:
+    """What the gate refuses, and what becomes "open" with and without it, when data go missing."""
+    from benchmarks.gate import gate_table, measure
+    from doorstate.console import progress_bar
+    from doorstate.dataset.store import open_dataset
+
+    with progress_bar("gate") as progress:
+        rows = measure(open_dataset(data), network, count, fold, progress)
+    table = gate_table(rows)
+    _finish(out, "gate", rows, table, network=network, fold=fold, data=str(data))
+
+
+@app.command()
 def curves(
     out: Out,
     data: Annotated[Path, typer.Option(help="A prepared data set.")],

@@ -14,6 +14,7 @@ from typing import Any
 
 import pytest
 import torch
+from benchmarks.gate import FAULTS
 
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import ConfigError, RunError
@@ -266,3 +267,12 @@ def test_thinning_compares_answers(small_dataset: PreparedDataset, tmp_path: Pat
     )
     assert "| 3 |" in markdown
     assert "Sampling from some pixels" in output
+
+
+def test_gate_counts_what_faults_do(small_dataset: PreparedDataset, tmp_path: Path) -> None:
+    code, output, errors = run("gate", "--data", small_dataset.folder, "--count", 2, "--out", tmp_path)
+    assert (code, errors) == (0, "")
+    _, rows, _ = stored(tmp_path, "gate")
+    assert len(rows) == 2 * len(FAULTS)
+    assert all(row["gated"] in (None, row["careless"]) for row in rows), "the gate only takes answers away"
+    assert "nine tenths of the columns missing" in output

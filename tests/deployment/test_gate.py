@@ -8,16 +8,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
+from benchmarks.gate import FAULTS, glass, without
 
 from doorstate.clouds.camera import Pinhole
 from doorstate.clouds.io import ReadOptions, read_cloud
 from doorstate.dataset.store import PreparedDataset
 from doorstate.deployment.gate import Gate
 from doorstate.deployment.predictor import Predictor
-from doorstate.simulation.generate import Frame, replay
+from doorstate.simulation.generate import replay
 from doorstate.simulation.manifest import unflatten
-from doorstate.types import Part, Points
+from doorstate.types import Points
 
 REAL = Path(__file__).resolve().parents[3] / "shared" / "real"
 HEIGHT, WIDTH = 480, 640
@@ -31,18 +31,6 @@ def room(wall_m: float = 3.0, floor_m: float = 5.0, opening: bool = False) -> Po
     depth_m = np.minimum(np.where(through, np.inf, wall_m), to_floor_m)
     depth_m[depth_m > floor_m] = np.nan
     return (depth_m[..., None] * np.stack((np.ones_like(up), across, up), axis=-1)).astype(np.float32)
-
-
-def without(cloud: Points, missing: NDArray[np.bool_]) -> Points:
-    cut = cloud.copy()
-    cut[missing] = np.nan
-    return cut
-
-
-def glass(row: dict[str, str], frame: Frame) -> Points:
-    """The frame as if the leaf and what lies behind the opening gave no return."""
-    shut = replay(unflatten({**row, "opening_angle_deg": "0"}))
-    return without(frame.points, (shut.full.part == Part.LEAF) | (frame.full.part == Part.LEAF))
 
 
 def test_a_wall_and_an_opening_with_floor_behind_pass() -> None:
@@ -130,20 +118,11 @@ def test_a_door_that_is_not_open_never_becomes_open_by_losing_data(small_dataset
     predictor = Predictor.load(points=512)
     careless = Predictor(predictor.network, predictor.card, 512, gate=None)
     wrong_without_gate = 0
-    row, column = np.indices((HEIGHT, WIDTH))
     shut = [sample for sample in small_dataset.rows if sample["state"] != "open"]
     for number, sample in enumerate(shut[::5]):
         frame = replay(unflatten(sample))
-        lost = np.random.default_rng(number).random(WIDTH) < 0.9
-        faults = [
-            without(frame.points, column < WIDTH // 2),
-            without(frame.points, column >= WIDTH // 2),
-            without(frame.points, (column > 160) & (column < 480)),
-            without(frame.points, np.broadcast_to(lost, (HEIGHT, WIDTH))),
-            without(frame.points, row < HEIGHT // 2),
-            glass(sample, frame),
-        ]
-        for cloud in faults:
+        for fault in FAULTS.values():
+            cloud = fault(sample, frame, np.random.default_rng(number))
             answer = predictor(cloud)
             assert answer.state is None or answer.state.label != "open"
             assert (answer.state is None) == bool(answer.reason)
@@ -159,6 +138,6 @@ def test_recorded_frames_pass() -> None:
         if row["file"].endswith(".png") and "8bit" not in row["file"]:
             camera = Pinhole(*(float(row[name]) for name in ("fx", "fy", "cx", "cy")))
             cloud = read_cloud(REAL / row["file"], ReadOptions(intrinsics=camera))
-            refused[row["file"]] = Gate()(cloud.reshape(int(row["height"]), int(row["width"]), 3))
+            refused[row["file"]] = Gate()(cloud)
     assert len(refused) >= 20
     assert {name: reason for name, reason in refused.items() if reason is not None} == {}

@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the gate refuses, and what becomes "open" with and without it, when data of known doors go missing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.store import Group
+from doorstate.dataset.splits import draw_splits
+from doorstate.dataset.store import PreparedDataset
+from doorstate.deployment.predictor import Predictor
+from doorstate.errors import CloudContentError
+from doorstate.evaluation.table import Table
+from doorstate.jobs import Progress
+from doorstate.simulation.generate import Frame, replay
+from doorstate.simulation.manifest import unflatten
+from doorstate.types import STATES, Part, Points
+
+Fault = Callable[[dict[str, str], Frame, np.random.Generator], Points]
+
+
+def without(cloud: Points, missing: NDArray[np.bool_]) -> Points:
+    """The cloud (H, W, 3) with NaN where (H, W) is missing."""
+    cut = cloud.copy()
+    cut[missing] = np.nan
+    return cut
+
+
+def glass(row: dict[str, str], frame: Frame) -> Points:
+    """The frame as if the leaf, and the leaf's place in its frame, gave no return."""
+    shut = replay(unflatten({**row, "opening_angle_deg": "0"}))
+    return without(frame.points, (shut.full.part == Part.LEAF) | (frame.full.part == Part.LEAF))
+
+
+def _band(first: float, last: float, axis: int) -> Fault:
+    """Loses what is between two shares of the image's height (axis 0) or width (axis 1)."""
+
+    def fault(row: dict[str, str], frame: Frame, generator: np.random.Generator) -> Points:
+        shape = frame.points.shape[:2]
+        place = np.indices(shape)[axis] / shape[axis]
+        return without(frame.points, (place >= first) & (place < last))
+
+    return fault
+
+
+def _dropout(share: float, columns: bool) -> Fault:
+    """Loses a share of all pixels, or of all columns."""
+
+    def fault(row: dict[str, str], frame: Frame, generator: np.random.Generator) -> Points:
+        height, width = frame.points.shape[:2]
+        lost = generator.random(width if columns else (height, width)) < share
+        return without(frame.points, np.broadcast_to(lost, (height, width)))
+
+    return fault
+
+
+FAULTS: dict[str, Fault] = {
+    "none": lambda row, frame, generator: frame.points,
+    "left half missing": _band(0.0, 0.5, 1),
+    "right half missing": _band(0.5, 1.0, 1),
+    "middle half missing": _band(0.25, 0.75, 1),
+    "middle fifth missing": _band(0.4, 0.6, 1),
+    "upper half missing": _band(0.0, 0.5, 0),
+    "lower half missing": _band(0.5, 1.0, 0),
+    "nine tenths of the columns missing": _dropout(0.9, columns=True),
+    "half of the pixels missing": _dropout(0.5, columns=False),
+    "glass leaf": lambda row, frame, generator: glass(row, frame),
+}
+
+
+def measure(dataset: PreparedDataset, network: str, count: int, fold: int, progress: Progress) -> list[Group]:
+    """Answers of packaged weights, with and without gate, on test clouds of a fold with every fault."""
+    roles = draw_splits(dataset.rows, "paper", 0)[fold]
+    tested = [row for row in dataset.rows if roles[row["sample_id"]] == "test"]
+    chosen = np.random.default_rng(0).permutation(len(tested))[:count]
+    predictor = Predictor.load(network)
+    careless = Predictor(predictor.network, predictor.card, predictor.points, gate=None)
+    rows = []
+    for done, index in enumerate(chosen):
+        progress(done, len(chosen))
+        row, frame = tested[index], replay(unflatten(tested[index]))
+        for name, fault in FAULTS.items():
+            cloud = fault(row, frame, np.random.default_rng(index))
+            rows.append(
+                {
+                    "sample_id": row["sample_id"],
+                    "state": row["state"],
+                    "fault": name,
+                    "gated": _told(predictor, cloud),
+                    "careless": _told(careless, cloud),
+                }
+            )
+    progress(len(chosen), len(chosen))
+    return rows
+
+
+def gate_table(rows: Sequence[Group]) -> Table:
+    """A line for each fault: how many clouds are refused by state, and doors that became open."""
+    lines = []
+    for fault in FAULTS:
+        those = [row for row in rows if row["fault"] == fault]
+        refused = [
+            f"{sum(row['gated'] is None for row in those if row['state'] == state)} of "
+            f"{sum(row['state'] == state for row in those)}"
+            for state in STATES
+        ]
+        shut = [row for row in those if row["state"] != "open"]
+        opened = [str(sum(row[name] == "open" for row in shut)) for name in ("gated", "careless")]
+        lines.append((fault, *refused, str(len(shut)), *opened))
+    return Table(
+        "What the gate refuses",
+        (
+            "fault",
+            *(f"refused, {state.replace('_', '-')}" for state in STATES),
+            "doors not open",
+            "called open",
+            "called open without the gate",
+        ),
+        tuple(lines),
+        "Packaged weights on test clouds of their fold, each with every fault.",
+    )
+
+
+def _told(predictor: Predictor, cloud: Points) -> str | None:
+    try:
+        state = predictor(cloud).state
+    except CloudContentError:  # hardly anything is left
+        return None
+    return None if state is None else state.label
