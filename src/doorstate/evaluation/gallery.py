@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import base64
 import io
 from collections import Counter, defaultdict
 from collections.abc import Callable, Mapping
@@ -16,9 +15,9 @@ from PIL import Image
 
 from doorstate.dataset.store import PreparedDataset
 from doorstate.evaluation.found_shapes import encode_shapes
+from doorstate.evaluation.pages import data_uri, encode_cloud
 from doorstate.evaluation.results import ComparisonResults, ErrorRow
 from doorstate.evaluation.stratum_tables import is_undecidable
-from doorstate.types import Points
 
 CARDS_PER_NETWORK = 16
 _SHOWN_POINTS = 2048
@@ -127,23 +126,4 @@ def _picture_uri(picture: NDArray[np.uint8]) -> str:
 
 
 def _encode_cloud(dataset: PreparedDataset, index: int) -> dict[str, str | None]:
-    points, parts = dataset.cloud(index, _SHOWN_POINTS), dataset.parts(index, _SHOWN_POINTS)
-    return {
-        "points": _base64(_millimetres(points).tobytes()),
-        "parts": None if parts is None else _base64(parts.tobytes()),
-    }
-
-
-def _millimetres(points: Points) -> NDArray[np.int16]:
-    """Round to the three decimals a viewer needs; a point beyond 32 m is drawn at 32 m."""
-    limit = np.iinfo(np.int16)
-    return np.asarray(np.clip(np.rint(points * 1000.0), limit.min, limit.max), dtype="<i2")
-
-
-def data_uri(content: bytes, media_type: str) -> str:
-    """Put a file into an address, so that the page needs no other file."""
-    return f"data:{media_type};base64,{_base64(content)}"
-
-
-def _base64(content: bytes) -> str:
-    return base64.b64encode(content).decode("ascii")
+    return encode_cloud(dataset.cloud(index, _SHOWN_POINTS), dataset.parts(index, _SHOWN_POINTS))

@@ -47,9 +47,7 @@ def honest_notes(results: ComparisonResults, dataset: PreparedDataset) -> list[s
             "different folds are not directly comparable."
         )
     if comparison.folds < NUM_FOLDS:
-        notes.append(
-            f"Only {comparison.folds} of {NUM_FOLDS} folds were asked for; other samples are untested."
-        )
+        notes.append(f"Only {comparison.folds} of {NUM_FOLDS} folds are shown; other samples are untested.")
     if len(dataset.rows) < PAPER_SAMPLES:
         notes.append(f"Reduced data: {len(dataset.rows)} samples, the paper has {PAPER_SAMPLES}.")
     if comparison.num_points < NUM_POINTS:

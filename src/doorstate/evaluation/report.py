@@ -9,8 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined
-from plotly.offline import get_plotlyjs
 
 from doorstate.dataset.store import PreparedDataset, open_dataset
 from doorstate.evaluation.figures import (
@@ -21,22 +19,17 @@ from doorstate.evaluation.figures import (
     save_drawings,
     write_figures,
 )
-from doorstate.evaluation.gallery import build_gallery, data_uri
+from doorstate.evaluation.gallery import build_gallery
 from doorstate.evaluation.metrics import ratio
 from doorstate.evaluation.notes import PROTOCOLS, honest_notes
+from doorstate.evaluation.pages import data_uri, render_page
 from doorstate.evaluation.results import ComparisonResults, load_results
 from doorstate.evaluation.score_tables import answers_given, pooled_confusion
 from doorstate.evaluation.table import Table
 from doorstate.evaluation.tables import build_tables, dataset_tables, save_tables, write_tables
-from doorstate.evaluation.views import (
-    PART_COLORS,
-    SHAPE_COLORS,
-    STATE_COLORS,
-    VIEW_AZIMUTH_RAD,
-    VIEW_ELEVATION_RAD,
-)
+from doorstate.evaluation.views import SHAPE_COLORS, STATE_COLORS
 from doorstate.files import write_text
-from doorstate.types import STATES, Part
+from doorstate.types import STATES
 
 
 def write_report(comparison_folder: Path, out_html: Path, dataset_folder: Path | None = None) -> Path:
@@ -58,13 +51,16 @@ def write_report(comparison_folder: Path, out_html: Path, dataset_folder: Path |
     return out_html
 
 
-def write_everything(comparison_folder: Path, out_folder: Path, dataset_folder: Path | None = None) -> Path:
+def write_everything(
+    comparison_folder: Path, out_folder: Path, dataset_folder: Path | None = None, folds: int | None = None
+) -> Path:
     """Write `tables/`, `figures/` and `report.html`; the same inputs give the same bytes.
 
     Args:
         comparison_folder: finished or partly finished.
         out_folder: made if absent.
         dataset_folder: its data set, if it is not where the comparison says.
+        folds: show the first so many folds only.
 
     Returns:
         The report.
@@ -73,7 +69,7 @@ def write_everything(comparison_folder: Path, out_folder: Path, dataset_folder: 
         RunError: the comparison cannot be used.
         DatasetError: its data set or splits cannot be used.
     """
-    results = load_results(comparison_folder, dataset_folder)
+    results = load_results(comparison_folder, dataset_folder, folds)
     dataset = open_dataset(results.dataset_folder)
     tables = write_tables(results, dataset, out_folder / "tables")
     drawings = write_figures(results, dataset, out_folder / "figures")
@@ -115,15 +111,9 @@ def render_report(
         tables: what `build_tables` gave.
         drawings: what `draw_figures` gave.
     """
-    environment = Environment(
-        loader=PackageLoader("doorstate.evaluation"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
     gallery = build_gallery(results, dataset)
-    return environment.get_template("report.html.j2").render(
+    return render_page(
+        "report.html.j2",
         results=results,
         comparison=results.comparison,
         recipe=json.dumps(results.comparison.recipe, indent=2, default=str),
@@ -147,17 +137,7 @@ def render_report(
             }
         ),
         gallery=gallery,
-        page_data={
-            "clouds": gallery.clouds,
-            "shapes": gallery.shapes,
-            "shape_colors": SHAPE_COLORS,
-            "parts": [
-                {"value": part, "name": part.name.lower(), "color": PART_COLORS[part]} for part in Part
-            ],
-            "view": {"azimuth": VIEW_AZIMUTH_RAD, "elevation": VIEW_ELEVATION_RAD},
-        },
-        # The library is kept as text until the first cloud is opened, so the page itself appears at once.
-        plotly=get_plotlyjs().replace("</script", r"<\/script"),
+        page_data={"clouds": gallery.clouds, "shapes": gallery.shapes},
     )
 
 

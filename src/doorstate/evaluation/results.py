@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -168,18 +168,22 @@ class ComparisonResults:
         )
 
 
-def load_results(comparison_folder: Path, dataset_folder: Path | None = None) -> ComparisonResults:
+def load_results(
+    comparison_folder: Path, dataset_folder: Path | None = None, folds: int | None = None
+) -> ComparisonResults:
     """Read a comparison folder; runs without predictions are listed in `missing`, everything else must fit.
 
     Args:
         comparison_folder: holds `comparison.json`, `splits.csv` and `runs/<network>/fold<k>/`.
         dataset_folder: its data set, if it is not where the comparison says.
+        folds: read the first so many folds only, as if no more had been asked for.
 
     Raises:
         RunError: no run is finished, a file is missing or damaged, a network tested a sample twice, or a
             state or a test set differs from the manifest of the data set or from the splits.
     """
     comparison = _read_comparison(comparison_folder / "comparison.json")
+    comparison = replace(comparison, folds=min(comparison.folds, folds or comparison.folds))
     splits = read_splits(comparison_folder / "splits.csv")
     if len(splits) < comparison.folds:
         raise RunError(f"{comparison_folder / 'splits.csv'}: {len(splits)} folds, not {comparison.folds}")

@@ -1,8 +1,7 @@
 "use strict";
 (() => {
-  const data = JSON.parse(document.getElementById("page-data").textContent);
+  const { data, part, shapeColor } = clouds;
   const LIVE_AT_ONCE = 4; // browsers drop the oldest WebGL contexts at about eight
-  const part = Object.fromEntries(data.parts.map((p) => [p.value, p]));
 
   // ---- network filters -------------------------------------------------------------------------------------
   for (const group of document.querySelectorAll(".chips")) {
@@ -24,23 +23,7 @@
   }
 
   // ---- clouds ----------------------------------------------------------------------------------------------
-  const bytes = (text) => Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
-
-  function decode(sample) {
-    const { points, parts } = data.clouds[sample];
-    const raw = new DataView(bytes(points).buffer);
-    const count = raw.byteLength / 6;
-    const axis = (k) => Float32Array.from({ length: count }, (_, i) => raw.getInt16(6 * i + 2 * k, true) / 1000);
-    return { count, x: axis(0), y: axis(1), z: axis(2), parts: parts && bytes(parts) };
-  }
-
-  function groupsOf(cloud) {
-    const everything = Array.from({ length: cloud.count }, (_, i) => i);
-    if (!cloud.parts) return [{ name: "height", color: null, members: everything }];
-    return [...new Set(cloud.parts)].sort((a, b) => a - b).map((value) => ({
-      ...part[value], members: everything.filter((i) => cloud.parts[i] === value),
-    }));
-  }
+  const decode = (sample) => clouds.decode(data.clouds[sample]);
 
   function heightColors(z) {
     let low = Infinity, high = -Infinity;
@@ -51,7 +34,6 @@
   // What rules found in a sample: [method, { name, points }] in the order of the answers.
   const shapesOf = (sample) =>
     Object.entries(data.shapes[sample]).flatMap(([method, shapes]) => shapes.map((shape) => [method, shape]));
-  const shapeColor = (name) => data.shape_colors[name] || data.shape_colors.edge;
 
   // The same oblique view as Figure 2: from behind and above the camera, near points last.
   function preview(canvas, cloud, shapes) {
@@ -101,13 +83,6 @@
   // ---- 3D, made when asked for -----------------------------------------------------------------------------
   const live = [];
 
-  function needPlotly() {
-    if (window.Plotly) return;
-    const script = document.createElement("script");
-    script.textContent = document.getElementById("plotly").textContent;
-    document.head.append(script);
-  }
-
   function close(plot) {
     window.Plotly.purge(plot);
     plot.previousElementSibling.hidden = false;
@@ -115,41 +90,15 @@
   }
 
   function open(button) {
-    needPlotly();
     const { sample } = button.closest(".card").dataset;
     const cloud = decode(sample);
-    const pick = (values, members) => members.map((i) => values[i]);
-    const traces = groupsOf(cloud).map(({ name, color, members }) => ({
-      type: "scatter3d", mode: "markers", name, hovertemplate: "x %{x:.2f}, y %{y:.2f}, z %{z:.2f} m",
-      x: pick(cloud.x, members), y: pick(cloud.y, members), z: pick(cloud.z, members),
-      marker: color ? { size: 2, color } : { size: 2, color: pick(cloud.z, members), colorscale: "Viridis" },
-    }));
-    traces.push({
-      type: "scatter3d", mode: "markers", name: "camera", hovertemplate: "camera",
-      x: [0], y: [0], z: [0], marker: { size: 5, symbol: "diamond", color: "#d62728" },
-    });
-    for (const [method, { name, points }] of shapesOf(sample)) {
-      const [color, title] = [shapeColor(name), `${method}: ${name}`];
-      traces.push({
-        type: "scatter3d", mode: points.length === 1 ? "markers" : "lines", name: title, hovertemplate: title,
-        x: points.map((p) => p[0]), y: points.map((p) => p[1]), z: points.map((p) => p[2]),
-        line: { color, width: 5 }, marker: { size: 4, color },
-      });
-    }
+    const found = shapesOf(sample).map(([method, shape]) => clouds.shape(shape, `${method}: ${shape.name}`));
+    const traces = [...(cloud.parts ? clouds.byPart(cloud) : clouds.byHeight(cloud)), clouds.camera(), ...found];
     const plot = document.createElement("div");
     plot.className = "live";
     button.after(plot);
     button.hidden = true;
-    const ink = getComputedStyle(document.body).color;
-    const axis = (title) => ({ title: { text: title }, color: ink, gridcolor: "rgba(128,128,128,.3)", backgroundcolor: "rgba(0,0,0,0)" });
-    const { azimuth: a, elevation: e } = data.view;
-    const eye = { x: -2 * Math.cos(e) * Math.cos(a), y: -2 * Math.cos(e) * Math.sin(a), z: 2 * Math.sin(e) };
-    window.Plotly.newPlot(plot, traces, {
-      margin: { l: 0, r: 0, t: 0, b: 0 }, paper_bgcolor: "rgba(0,0,0,0)", font: { color: ink },
-      modebar: { bgcolor: "rgba(0,0,0,0)", color: ink },
-      legend: { orientation: "h", itemsizing: "constant", y: 0.02 },
-      scene: { aspectmode: "data", camera: { eye }, xaxis: axis("forward (m)"), yaxis: axis("left (m)"), zaxis: axis("up (m)") },
-    }, { displaylogo: false, responsive: true }).then(() => {
+    clouds.plotly().newPlot(plot, traces, clouds.layout(), clouds.config).then(() => {
       live.push(plot);
       if (live.length > LIVE_AT_ONCE) close(live.shift());
     });
