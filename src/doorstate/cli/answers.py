@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from doorstate.cli.options import DepthScale, Focal, Frame, IntrinsicsFile, Roll, Units, read_options
-from doorstate.cli.predictions import described, table_cells
+from doorstate.cli.predictions import table_cells
+from doorstate.deployment.answers import described
 from doorstate.errors import ConfigError, DoorstateError
 
 if TYPE_CHECKING:

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from doorstate.cli.predictions import described, table_cells
+from doorstate.cli.predictions import table_cells
+from doorstate.deployment.answers import described
 from doorstate.errors import CloudReadError, ConfigError, DoorstateError
 
 if TYPE_CHECKING:

@@ -35,7 +35,6 @@ Changes = Annotated[
     list[str] | None,
     typer.Option("--set", help="A field of the recipe, such as --set batch_size=32; repeatable."),
 ]
-UNITS_M = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "km": 1000.0}
 
 
 def read_options(
@@ -47,20 +46,11 @@ def read_options(
     flags: tuple[float | None, float | None, float | None, float | None],
 ) -> ReadOptions:
     """What the options say of cloud files; one error line for what does not fit together."""
-    from doorstate.clouds.camera import Intrinsics, Pinhole, read_intrinsics
-    from doorstate.clouds.io import ReadOptions
+    from doorstate.clouds.camera import read_intrinsics
+    from doorstate.clouds.io import options_from_flags
 
-    if units not in UNITS_M:
-        raise ConfigError(f"--units {units}: choose one of {', '.join(UNITS_M)}")
-    intrinsics: Intrinsics | Pinhole | None = None
-    if intrinsics_file is not None:
-        intrinsics = read_intrinsics(intrinsics_file)
-    elif any(value is not None for value in flags):
-        fx, fy, cx, cy = flags
-        if fx is None or fy is None or cx is None or cy is None:
-            raise ConfigError("--fx, --fy, --cx and --cy belong together: give all four")
-        intrinsics = Pinhole(fx, fy, cx, cy)
-    return ReadOptions(frame, roll, intrinsics, depth_scale, UNITS_M[units])  # type: ignore[arg-type]
+    intrinsics = None if intrinsics_file is None else read_intrinsics(intrinsics_file)
+    return options_from_flags(frame, roll, units, depth_scale, intrinsics, flags)
 
 
 def recipe_changes(settings: list[str] | None, epochs: int | None) -> dict[str, Any]:

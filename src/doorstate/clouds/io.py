@@ -21,7 +21,7 @@ from doorstate.clouds.pcd import parse_pcd
 from doorstate.clouds.ply import parse_ply
 from doorstate.clouds.png import parse_depth_png
 from doorstate.clouds.tables import parse_table
-from doorstate.errors import CameraError, CloudReadError, DoorstateError
+from doorstate.errors import CameraError, CloudReadError, ConfigError, DoorstateError
 from doorstate.types import Points
 
 _PARSERS: dict[str, Callable[[bytes], NDArray[Any]]] = {
@@ -73,6 +73,38 @@ class ReadOptions:
 
 
 DEFAULT_OPTIONS = ReadOptions()
+UNITS_M = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "km": 1000.0}
+
+
+def options_from_flags(
+    frame: str,
+    roll: int,
+    units: str,
+    depth_scale: float,
+    intrinsics: Intrinsics | None,
+    flags: tuple[float | None, float | None, float | None, float | None],
+) -> ReadOptions:
+    """What a user says of files in the words of the command line.
+
+    Args:
+        frame, roll, depth_scale: as of `ReadOptions`.
+        units: a name of `UNITS_M`.
+        intrinsics: camera of depth images, which goes before the flags.
+        flags: fx, fy, cx, cy in pixels: all or none.
+
+    Raises:
+        ConfigError: no such unit, or some of the flags only.
+        CameraError: as of `ReadOptions`.
+    """
+    if units not in UNITS_M:
+        raise ConfigError(f"--units {units}: choose one of {', '.join(UNITS_M)}")
+    camera: Intrinsics | Pinhole | None = intrinsics
+    if camera is None and any(value is not None for value in flags):
+        fx, fy, cx, cy = flags
+        if fx is None or fy is None or cx is None or cy is None:
+            raise ConfigError("--fx, --fy, --cx and --cy belong together: give all four")
+        camera = Pinhole(fx, fy, cx, cy)
+    return ReadOptions(frame, roll, camera, depth_scale, UNITS_M[units])  # type: ignore[arg-type]
 
 
 def read_cloud(path: Path, options: ReadOptions = DEFAULT_OPTIONS) -> Points:
@@ -89,25 +121,53 @@ def read_cloud(path: Path, options: ReadOptions = DEFAULT_OPTIONS) -> Points:
         CloudReadError: when the file cannot be read as what its suffix says.
         CameraError: when a depth image lacks intrinsics or they are for another image size.
     """
-    suffix = path.suffix.lower()
     try:
         if path.is_dir():
             raise CloudReadError("is a folder, not a file")
-        if suffix not in _PARSERS:
-            raise CloudReadError(f"unknown file type: give one of {' '.join(CLOUD_SUFFIXES)}")
-        data = _read_bytes(path)
+        check_suffix(path.suffix)
+        return parse_cloud(_read_bytes(path), path.suffix, options)
+    except DoorstateError as error:
+        raise type(error)(f"{path.name}: {error}") from error
+
+
+def parse_cloud(data: bytes, suffix: str, options: ReadOptions = DEFAULT_OPTIONS) -> Points:
+    """Read the content of a file as `read_cloud` reads the file.
+
+    Args:
+        data: what the file holds.
+        suffix: which reader to take, such as `.pcd`.
+        options: what the file does not say about itself.
+
+    Returns:
+        As of `read_cloud`.
+
+    Raises:
+        CloudReadError: when the content cannot be read as what the suffix says.
+        CameraError: when a depth image lacks intrinsics or they are for another image size.
+    """
+    suffix = suffix.lower()
+    check_suffix(suffix)
+    if not data:
+        raise CloudReadError("is empty (0 bytes)")
+    try:
         # What a library warns of in foreign bytes either ends in an error below or is of no concern.
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             stored = _PARSERS[suffix](data)
             is_depth = suffix == ".png" or (stored.ndim == 2 and stored.shape[1] > _MAX_POINT_VALUES)
             return points_from_depth(stored, options) if is_depth else _points_from_rows(stored, options)
-    except DoorstateError as error:
-        raise type(error)(f"{path.name}: {error}") from error
+    except DoorstateError:
+        raise
     except Exception as error:
         # Foreign bytes make parsing libraries raise anything; to the user it is one thing.
         reason = " ".join(f"{type(error).__name__}: {error}".split())[:160]
-        raise CloudReadError(f"{path.name}: damaged, or no {suffix} file ({reason})") from error
+        raise CloudReadError(f"damaged, or no {suffix} file ({reason})") from error
+
+
+def check_suffix(suffix: str) -> None:
+    """Raise CloudReadError unless files that end so can be read."""
+    if suffix.lower() not in _PARSERS:
+        raise CloudReadError(f"unknown file type: give one of {' '.join(CLOUD_SUFFIXES)}")
 
 
 def find_clouds(paths: Sequence[Path]) -> list[Path]:
@@ -148,12 +208,9 @@ def _natural_order(path: Path) -> tuple[list[str | int], str]:
 
 def _read_bytes(path: Path) -> bytes:
     try:
-        data = path.read_bytes()
+        return path.read_bytes()
     except OSError as error:
         raise CloudReadError(f"cannot be read: {error.strerror or error}") from error
-    if not data:
-        raise CloudReadError("is empty (0 bytes)")
-    return data
 
 
 def points_from_depth(stored: NDArray[Any], options: ReadOptions) -> Points:
