@@ -14,6 +14,7 @@ import typer
 from doorstate.cli.answers import info, predict
 from doorstate.cli.data import prepare, simulate
 from doorstate.cli.resolution import resolution
+from doorstate.cli.service import serve
 from doorstate.cli.training import compare, report, train
 from doorstate.errors import DoorstateError
 
@@ -26,7 +27,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
 )
-for command in (simulate, prepare, train, compare, report, resolution, predict, info):
+for command in (simulate, prepare, train, compare, report, resolution, predict, serve, info):
     app.command()(command)
 
 

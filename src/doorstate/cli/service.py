@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The command that answers over HTTP."""
+
+from __future__ import annotations
+
+import math
+import signal
+import socket
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from doorstate.errors import ConfigError, MissingExtraError
+
+
+def serve(
+    host: Annotated[
+        str, typer.Option(help="Address to listen on; 0.0.0.0 lets other machines in.")
+    ] = "127.0.0.1",
+    port: Annotated[int, typer.Option(help="0 takes any that is free.", min=0, max=65535)] = 8000,
+    network: Annotated[str, typer.Option(help="Network whose packaged weights to use.")] = "pointnet2",
+    weights: Annotated[
+        Path | None, typer.Option(help="A weights file of your own, in place of --network.")
+    ] = None,
+    points: Annotated[
+        int | None, typer.Option(help="Points to look at; as trained if not given.", min=128)
+    ] = None,
+    max_megabytes: Annotated[float, typer.Option(help="Larger files are refused.", min=0.001)] = 64.0,
+    timeout_s: Annotated[
+        float, typer.Option(help="From the head of a request to its answer; slower ones end.", min=0.1)
+    ] = 30.0,
+    queue: Annotated[int, typer.Option(help="Files that may wait for a worker.", min=0)] = 16,
+    workers: Annotated[
+        int | None, typer.Option(help="Files in work at a time; all processors if not given.", min=1)
+    ] = None,
+    verbose: Annotated[bool, typer.Option("--verbose", help="Say every request on standard error.")] = False,
+) -> None:
+    """Answer clouds over HTTP: POST a file to /predict, get JSON (docs/service.md).
+
+    \b
+    Examples:
+      doorstate serve
+      doorstate serve --port 9000 --network pointnet2 --points 1024 --workers 2
+      curl --data-binary @cloud.pcd 'http://127.0.0.1:8000/predict?format=pcd'
+    """
+    try:
+        import uvicorn
+
+        from doorstate.deployment.service import create_app
+        from doorstate.deployment.workload import Limits
+    except ImportError as error:
+        raise MissingExtraError(
+            'serve needs the packages fastapi and uvicorn: pip install "doorstate[serve]"'
+        ) from error
+    import torch
+
+    from doorstate.deployment.predictor import Predictor
+    from doorstate.jobs import default_workers
+    from doorstate.training.environment import keep_freed_memory
+
+    workers = workers or default_workers()
+    limits = Limits(int(max_megabytes * 2**20), timeout_s, queue, workers)
+    keep_freed_memory()
+    torch.set_num_threads(max(1, default_workers() // workers))
+    predictor = Predictor.load(weights or network, points)
+    predictor.warm_up()
+    listening = _listen(host, port)
+    server = uvicorn.Server(
+        uvicorn.Config(
+            create_app(predictor, limits),
+            http="h11",
+            ws="none",
+            log_level="info" if verbose else "warning",
+            access_log=verbose,
+            timeout_graceful_shutdown=math.ceil(timeout_s),
+        )
+    )
+    # Uvicorn stops at these signals, and sends them again when it has stopped: that is no failure.
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: setattr(server, "should_exit", True))
+    address = f"[{host}]" if ":" in host else host
+    print(  # noqa: T201
+        f"doorstate: listening on http://{address}:{listening.getsockname()[1]} "
+        f"({predictor.card.network}, {predictor.points} points, workers: {workers})",
+        flush=True,
+    )
+    server.run(sockets=[listening])
+
+
+def _listen(host: str, port: int) -> socket.socket:
+    try:
+        return socket.create_server((host, port), family=socket.AF_INET6 if ":" in host else socket.AF_INET)
+    except OSError as error:
+        raise ConfigError(f"cannot listen on {host}, port {port}: {error.strerror or error}") from error
