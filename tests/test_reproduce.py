@@ -54,6 +54,25 @@ def test_publishing_takes_what_is_small_of_finished_runs(reproduce: ModuleType, 
     ]
 
 
+def test_folds_that_all_methods_have_finished_are_shown(reproduce: ModuleType, tmp_path: Path) -> None:
+    from results_page import unfinished_runs, whole_folds
+
+    (tmp_path / "comparison.json").write_text('{"networks": ["dgcnn"], "rules": ["angle_bins"], "folds": 3}')
+    shown = []
+    for method, fold in (
+        ("dgcnn", 0),
+        ("dgcnn", 1),
+        ("angle_bins", 0),
+        ("angle_bins", 2),
+        ("angle_bins", 1),
+        ("dgcnn", 2),
+    ):
+        RunFolder(tmp_path / "runs" / method / f"fold{fold}").finish({})
+        shown.append(whole_folds(tmp_path))
+    assert shown == [0, 0, 1, 1, 2, 3]
+    assert unfinished_runs(tmp_path) == []
+
+
 @pytest.mark.parametrize("arguments", [[], ["run"], ["check", "now"], ["publish"], ["sell", "paper"]])
 def test_wrong_usage_shows_how(reproduce: ModuleType, arguments: list[str]) -> None:
     with pytest.raises(SystemExit, match=r"reproduce\.py run paper"):

@@ -114,8 +114,8 @@ def build(root: Path) -> None:
     from doorstate.evaluation.report import write_everything
     from doorstate.evaluation.resolution import write_resolution
 
-    for folder in _comparisons():
-        write_everything(folder, root / "results" / folder.name / "report", ROWS)
+    for folder, folds in _comparisons():
+        write_everything(folder, root / "results" / folder.name / "report", ROWS, folds)
     if (RESULTS / "resolution").is_dir():
         write_resolution(RESULTS / "resolution", root / "results" / "resolution" / "report", ROWS)
     write_page(RESULTS, ROWS, root / "results", root / PAGE)
@@ -146,13 +146,13 @@ def check() -> str | None:
     return None
 
 
-def _comparisons() -> Iterator[Path]:
-    """Folders of published comparisons whose runs are all there; others are still being trained."""
-    from results_page import unfinished_runs
+def _comparisons() -> Iterator[tuple[Path, int]]:
+    """Folders of published comparisons, and how many of their folds all methods have finished; at least one."""
+    from results_page import whole_folds
 
     for path in sorted(RESULTS.glob("*/comparison.json")):
-        if not unfinished_runs(path.parent):
-            yield path.parent
+        if folds := whole_folds(path.parent):
+            yield path.parent, folds
 
 
 def _doorstate(arguments: str) -> None:

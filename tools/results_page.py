@@ -81,7 +81,7 @@ def write_page(results_folder: Path, rows_folder: Path, reports_folder: Path, pa
     published = {
         folder.name: _published(folder, rows_folder, reports_folder)
         for folder in folders
-        if not waiting[folder.name]
+        if whole_folds(folder)
     }
     resolution = results_folder / "resolution"
     environment = Environment(
@@ -107,13 +107,22 @@ def write_page(results_folder: Path, rows_folder: Path, reports_folder: Path, pa
 
 def unfinished_runs(folder: Path) -> list[str]:
     """Runs of a published comparison that are not there yet, as `network fold k`."""
-    asked = read_json(folder / "comparison.json")
     return [
-        f"{network} fold {fold}"
-        for fold in range(asked["folds"])
-        for network in (*asked["networks"], *asked.get("rules", ()))
-        if not run_of(folder, network, fold).finished
+        f"{method} fold {fold}" for method, fold in _runs(folder) if not run_of(folder, method, fold).finished
     ]
+
+
+def whole_folds(folder: Path) -> int:
+    """How many folds, from the first on, all methods of a published comparison have finished: these are shown."""
+    missing = [fold for method, fold in _runs(folder) if not run_of(folder, method, fold).finished]
+    folds: int = read_json(folder / "comparison.json")["folds"]
+    return min(missing, default=folds)
+
+
+def _runs(folder: Path) -> list[tuple[str, int]]:
+    asked = read_json(folder / "comparison.json")
+    methods = (*asked["networks"], *asked.get("rules", ()))
+    return [(method, fold) for fold in range(asked["folds"]) for method in methods]
 
 
 def budget_table(published: list[Published]) -> Table:
@@ -151,7 +160,7 @@ def budget_table(published: list[Published]) -> Table:
 
 
 def _published(folder: Path, rows_folder: Path, reports_folder: Path) -> Published:
-    results = load_results(folder, rows_folder)
+    results = load_results(folder, rows_folder, whole_folds(folder))
     tables = reports_folder / folder.name / "report" / "tables"
     confusion = {network: pooled_confusion(results, network) for network in results.networks}
     return Published(

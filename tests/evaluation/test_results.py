@@ -66,6 +66,14 @@ def test_missing_runs_are_listed(simulated: PreparedDataset, make_comparison: Ca
     assert len(results.pooled("pointnet")) < len(simulated.rows)
 
 
+def test_the_first_folds_alone(simulated: PreparedDataset, make_comparison: Callable[..., Path]) -> None:
+    folder = make_comparison(simulated, missing=[("dgcnn", 2), ("pointnet", 4)])
+    results = load_results(folder, folds=2)
+    assert results.missing == ()
+    assert {run.fold for run in results.runs} == {0, 1}
+    assert load_results(folder, folds=9).missing == (("pointnet", 4), ("dgcnn", 2))
+
+
 def test_a_data_set_beside_the_comparison_is_found(
     simulated: PreparedDataset, make_comparison: Callable[..., Path]
 ) -> None:
