@@ -6,7 +6,7 @@ from __future__ import annotations
 import statistics
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
 
@@ -19,6 +19,7 @@ from doorstate.deployment.gate import Gate
 from doorstate.errors import ConfigError, WeightsError
 from doorstate.networks import list_networks
 from doorstate.networks.base import PointNetwork
+from doorstate.rules.base import Shape
 from doorstate.training.weights import WeightsCard, load_weights
 from doorstate.types import STATES, DoorState, Points
 
@@ -38,6 +39,7 @@ class Prediction:
     milliseconds: float  # from raw points to this answer
     reason: str = ""  # why there is no answer
     opening_angle_deg: float | None = None  # where the method tells it
+    found: tuple[Shape, ...] = field(default=(), compare=False, repr=False)  # by a rule, on the way
 
 
 class Predictor:

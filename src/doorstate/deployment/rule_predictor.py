@@ -59,6 +59,7 @@ class RulePredictor:
             (time.perf_counter() - started) * 1000,
             answer.reason,
             answer.opening_angle_deg,
+            answer.found,
         )
 
     def warm_up(self) -> None:
