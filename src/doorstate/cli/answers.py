@@ -9,8 +9,23 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from doorstate.cli.options import DepthScale, Focal, Frame, IntrinsicsFile, Roll, Units, read_options
-from doorstate.cli.predictions import table_cells
+from doorstate.cli.options import (
+    Bag,
+    CameraInfoTopic,
+    DepthScale,
+    Focal,
+    Frame,
+    IntrinsicsFile,
+    Network,
+    PointCount,
+    Roll,
+    RuleName,
+    Topic,
+    Units,
+    Weights,
+    read_options,
+)
+from doorstate.cli.predictions import load_predictor, table_cells
 from doorstate.deployment.answers import described
 from doorstate.errors import ConfigError, DoorstateError
 
@@ -22,27 +37,14 @@ def predict(
     files: Annotated[
         list[Path] | None, typer.Argument(help="Clouds, depth images, or folders of them.")
     ] = None,
-    network: Annotated[str, typer.Option(help="Network whose packaged weights to use.")] = "pointnet2",
-    weights: Annotated[
-        Path | None, typer.Option(help="A weights file of your own, in place of --network.")
-    ] = None,
-    rule: Annotated[
-        str | None, typer.Option(help="Answer by this rule instead of a network: doorstate info lists them.")
-    ] = None,
-    points: Annotated[
-        int | None, typer.Option(help="Points to look at; as trained if not given.", min=128)
-    ] = None,
+    network: Network = "pointnet2",
+    weights: Weights = None,
+    rule: RuleName = None,
+    points: PointCount = None,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object a line.")] = False,
-    bag: Annotated[
-        Path | None,
-        typer.Option(help="A ROS recording in place of files: .bag, .db3, .mcap, or ROS 2 folder."),
-    ] = None,
-    topic: Annotated[
-        str | None, typer.Option(help="PointCloud2 or depth image topic of the bag, if there are several.")
-    ] = None,
-    camera_info_topic: Annotated[
-        str | None, typer.Option(help="Camera of a depth image topic, if not camera_info beside it.")
-    ] = None,
+    bag: Bag = None,
+    topic: Topic = None,
+    camera_info_topic: CameraInfoTopic = None,
     every: Annotated[int, typer.Option(help="Answer every Nth message of the bag.", min=1)] = 1,
     out: Annotated[
         Path | None, typer.Option(help="Write the answers of the bag to this .csv or .jsonl file.")
@@ -71,9 +73,6 @@ def predict(
     from doorstate.cli.bags import predict_bag
     from doorstate.clouds.io import find_clouds
     from doorstate.console import err
-    from doorstate.deployment.predictor import Predictor
-    from doorstate.deployment.rule_predictor import RulePredictor
-    from doorstate.training.environment import keep_freed_memory
 
     if bool(files) == (bag is not None):
         err.print("doorstate: give files, or a recording by --bag: one of the two")
@@ -82,13 +81,9 @@ def predict(
         raise ConfigError("--topic, --camera-info-topic, --every and --out are for --bag")
     if out is not None and as_json:
         raise ConfigError("--out writes JSON lines to a file that ends in .jsonl: leave --json out")
-    if rule is not None and (weights is not None or points is not None):
-        raise ConfigError("--rule has no weights and looks at all points: leave --weights and --points out")
     options = read_options(frame, roll, units, depth_scale, intrinsics, (fx, fy, cx, cy))
     found = find_clouds(files or [])
-    keep_freed_memory()
-    predictor = Predictor.load(weights or network, points) if rule is None else RulePredictor.load(rule)
-    predictor.warm_up()
+    predictor = load_predictor(network, weights, rule, points)
     if bag is None:
         _predict_files(predictor, found, options, as_json)
     else:

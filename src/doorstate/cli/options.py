@@ -30,6 +30,22 @@ IntrinsicsFile = Annotated[
 Focal = Annotated[
     float | None, typer.Option(help="Focal length or centre in pixels, in place of --intrinsics.")
 ]
+# Who answers, and recordings to answer: the same options for `predict` and `view`.
+Network = Annotated[str, typer.Option(help="Network whose packaged weights to use.")]
+Weights = Annotated[Path | None, typer.Option(help="A weights file of your own, in place of --network.")]
+RuleName = Annotated[
+    str | None, typer.Option(help="Answer by this rule instead of a network: doorstate info lists them.")
+]
+PointCount = Annotated[int | None, typer.Option(help="Points to look at; as trained if not given.", min=128)]
+Bag = Annotated[
+    Path | None, typer.Option(help="A ROS recording in place of files: .bag, .db3, .mcap, or ROS 2 folder.")
+]
+Topic = Annotated[
+    str | None, typer.Option(help="PointCloud2 or depth image topic of the bag, if there are several.")
+]
+CameraInfoTopic = Annotated[
+    str | None, typer.Option(help="Camera of a depth image topic, if not camera_info beside it.")
+]
 Workers = Annotated[int | None, typer.Option(help="Processes; all processors if not given.", min=1)]
 Changes = Annotated[
     list[str] | None,
