@@ -204,6 +204,34 @@ def gate(
 
 
 @app.command()
+def service(
+    out: Out,
+    seconds: Annotated[float, typer.Option(help="Of every number of clients.", min=0.1)] = 60.0,
+    clients: Annotated[str, typer.Option(help="Numbers of clients, separated by commas.")] = "1,4,16",
+    network: Annotated[str, typer.Option(help="Whose packaged weights.")] = "pointnet2",
+    points: Annotated[int | None, typer.Option(help="As trained if not given.", min=128)] = None,
+    workers: Annotated[int | None, typer.Option(help="All processors if not given.", min=1)] = None,
+) -> None:
+    """What `doorstate serve` sustains on this machine: clouds a second, latency, errors, memory.
+
+    The clients run on the same processors as the service.
+    """
+    from benchmarks.service import measure, service_table
+    from doorstate.console import progress_bar
+    from doorstate.jobs import default_workers
+
+    counts, workers = _integers("--clients", clients, 1), workers or default_workers()
+    options = ["--network", network, "--workers", str(workers)]
+    options += [] if points is None else ["--points", str(points)]
+    with progress_bar("service") as progress:
+        rows = measure(counts, seconds, options, progress)
+    table = service_table(rows)
+    _finish(
+        out, "service", rows, table, network=network, points=points or "", workers=workers, seconds=seconds
+    )
+
+
+@app.command()
 def curves(
     out: Out,
     data: Annotated[Path, typer.Option(help="A prepared data set.")],

@@ -47,9 +47,9 @@ class MatrixPeak:
         return 2 * _MATRIX_SIZE**3 / min(seconds) / 1e9
 
 
-def resident_mib() -> float:
-    """Memory this process occupies now; NaN where /proc does not tell."""
-    return _status_mib("VmRSS")
+def resident_mib(process: int | str = "self") -> float:
+    """Memory a process occupies now, this one if not given; NaN where /proc does not tell."""
+    return _status_mib("VmRSS", process)
 
 
 def peak_resident_mib() -> float:
@@ -64,8 +64,8 @@ def reset_peak() -> None:
         clear.write_text("5")
 
 
-def _status_mib(field: str) -> float:
-    status = Path("/proc/self/status")
+def _status_mib(field: str, process: int | str = "self") -> float:
+    status = Path(f"/proc/{process}/status")
     lines = status.read_text(encoding="utf-8").splitlines() if status.exists() else []
     kib = [int(line.split()[1]) for line in lines if line.startswith(field + ":")]
     return kib[0] / 1024 if kib else float("nan")

@@ -276,3 +276,20 @@ def test_gate_counts_what_faults_do(small_dataset: PreparedDataset, tmp_path: Pa
     assert len(rows) == 2 * len(FAULTS)
     assert all(row["gated"] in (None, row["careless"]) for row in rows), "the gate only takes answers away"
     assert "nine tenths of the columns missing" in output
+
+
+def test_the_service_is_loaded_by_every_number_of_clients(tmp_path: Path) -> None:
+    few = ("--points", 128, "--workers", 1, "--seconds", 0.5, "--clients", "1,3")
+    code, output, errors = run("service", "--out", tmp_path, *few)
+    assert (code, errors) == (0, "")
+    _, rows, markdown = stored(tmp_path, "service")
+    assert [row["clients"] for row in rows] == [1, 3]
+    for row in rows:
+        answered = row["answers"]["200"]
+        assert row["answers"] == {"200": answered}
+        assert answered >= row["clients"]
+        assert row["clouds_per_s"] == pytest.approx(answered / row["seconds"])
+        assert row["p50_ms"] <= row["p99_ms"]
+        assert min(row["memory_mib"]) > 100
+    assert "| 3 |" in markdown
+    assert "The service under load" in output

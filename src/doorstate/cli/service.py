@@ -92,4 +92,5 @@ def _listen(host: str, port: int) -> socket.socket:
     try:
         return socket.create_server((host, port), family=socket.AF_INET6 if ":" in host else socket.AF_INET)
     except OSError as error:
-        raise ConfigError(f"cannot listen on {host}, port {port}: {error.strerror or error}") from error
+        reason = str(error.strerror or error).partition(" (while")[0]  # Python repeats the address there
+        raise ConfigError(f"cannot listen on {host}, port {port}: {reason}") from error
