@@ -115,7 +115,7 @@ def build(root: Path) -> None:
     from doorstate.evaluation.resolution import write_resolution
 
     for folder, folds in _comparisons():
-        write_everything(folder, root / "results" / folder.name / "report", ROWS, folds)
+        write_everything([folder], root / "results" / folder.name / "report", ROWS, folds)
     if (RESULTS / "resolution").is_dir():
         write_resolution(RESULTS / "resolution", root / "results" / "resolution" / "report", ROWS)
     write_page(RESULTS, ROWS, root / "results", root / PAGE)

@@ -132,8 +132,15 @@ def compare(
 
 
 def report(
-    folder: Annotated[Path, typer.Argument(help="A comparison, or a prepared data set.")],
-    out: Annotated[Path | None, typer.Option(help="Folder to write to; FOLDER/report if not given.")] = None,
+    folders: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="FOLDER...", help="Comparisons on the same samples, or one prepared data set."
+        ),
+    ],
+    out: Annotated[
+        Path | None, typer.Option(help="Folder to write to; report in the first FOLDER if not given.")
+    ] = None,
     data: Annotated[
         Path | None, typer.Option(help="The comparison's data set, if it is not where it was.")
     ] = None,
@@ -143,18 +150,19 @@ def report(
     \b
     Examples:
       doorstate report runs/one-fold
+      doorstate report runs/paper runs/related --out reports/all
       doorstate report data/ogurob-4096 --out reports/data
     """
     from doorstate.console import err
     from doorstate.console import out as stdout
     from doorstate.evaluation.report import write_dataset_figures, write_everything
 
-    target = out or folder / "report"
+    target = out or folders[0] / "report"
     with err.status("Writing the report"):
-        if (folder / "comparison.json").is_file():
-            page = write_everything(folder, target, data)
+        if len(folders) == 1 and not (folders[0] / "comparison.json").is_file():
+            page = write_dataset_figures(folders[0], target)
         else:
-            page = write_dataset_figures(folder, target)
+            page = write_everything(folders, target, data)
     stdout.print(f"report: {page}", soft_wrap=True)
 
 

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,50 +14,34 @@ from doorstate.dataset.store import PreparedDataset, open_dataset
 from doorstate.evaluation.figures import (
     Drawing,
     dataset_figures,
-    draw_figures,
     encode_figures,
     save_drawings,
     write_figures,
 )
 from doorstate.evaluation.gallery import build_gallery
+from doorstate.evaluation.join import load_joined
 from doorstate.evaluation.metrics import ratio
 from doorstate.evaluation.notes import PROTOCOLS, honest_notes
 from doorstate.evaluation.pages import data_uri, render_page
-from doorstate.evaluation.results import ComparisonResults, load_results
+from doorstate.evaluation.results import ComparisonResults
 from doorstate.evaluation.score_tables import answers_given, pooled_confusion
 from doorstate.evaluation.table import Table
-from doorstate.evaluation.tables import build_tables, dataset_tables, save_tables, write_tables
+from doorstate.evaluation.tables import dataset_tables, save_tables, write_tables
 from doorstate.evaluation.views import SHAPE_COLORS, STATE_COLORS
 from doorstate.files import write_text
 from doorstate.types import STATES
 
 
-def write_report(comparison_folder: Path, out_html: Path, dataset_folder: Path | None = None) -> Path:
-    """Write the report of a comparison as one self-contained HTML file.
-
-    Args:
-        comparison_folder: finished or partly finished.
-        out_html: the file to write.
-        dataset_folder: its data set, if it is not where the comparison says.
-
-    Raises:
-        RunError: the comparison cannot be used.
-        DatasetError: its data set or splits cannot be used.
-    """
-    results = load_results(comparison_folder, dataset_folder)
-    dataset = open_dataset(results.dataset_folder)
-    tables, drawings = build_tables(results, dataset), draw_figures(results, dataset)
-    write_text(out_html, render_report(results, dataset, tables, drawings))
-    return out_html
-
-
 def write_everything(
-    comparison_folder: Path, out_folder: Path, dataset_folder: Path | None = None, folds: int | None = None
+    comparison_folders: Sequence[Path],
+    out_folder: Path,
+    dataset_folder: Path | None = None,
+    folds: int | None = None,
 ) -> Path:
     """Write `tables/`, `figures/` and `report.html`; the same inputs give the same bytes.
 
     Args:
-        comparison_folder: finished or partly finished.
+        comparison_folders: finished or partly finished; several on the same samples are shown as one.
         out_folder: made if absent.
         dataset_folder: its data set, if it is not where the comparison says.
         folds: show the first so many folds only.
@@ -69,7 +53,7 @@ def write_everything(
         RunError: the comparison cannot be used.
         DatasetError: its data set or splits cannot be used.
     """
-    results = load_results(comparison_folder, dataset_folder, folds)
+    results = load_joined(comparison_folders, dataset_folder, folds)
     dataset = open_dataset(results.dataset_folder)
     tables = write_tables(results, dataset, out_folder / "tables")
     drawings = write_figures(results, dataset, out_folder / "figures")
