@@ -7,6 +7,8 @@ import io
 import json
 import os
 import re
+import shlex
+import shutil
 import signal
 import socket
 import subprocess
@@ -383,3 +385,17 @@ def test_without_the_extra_it_is_named(run: Run, monkeypatch: pytest.MonkeyPatch
     code, _, err = run("serve")
     assert code == 1
     assert err == 'doorstate: serve needs the packages fastapi and uvicorn: pip install "doorstate[serve]"\n'
+
+
+@pytest.mark.skipif(shutil.which("curl") is None, reason="curl is not here")
+def test_the_requests_in_the_docs_are_answered(client: httpx.Client, tmp_path: Path) -> None:
+    write_pcd(tmp_path / "cloud.pcd", CLOUD)
+    (tmp_path / "cloud.npy").write_bytes(NPY)
+    Image.fromarray(np.full((480, 640), 2000, np.uint16)).save(tmp_path / "depth.png")
+    text = (Path(__file__).resolve().parents[2] / "docs" / "service.md").read_text(encoding="utf-8")
+    commands = re.findall("^curl .*", text, flags=re.MULTILINE)
+    assert len(commands) == 4
+    for command in commands:
+        here = shlex.split(command.replace("http://127.0.0.1:8000", str(client.base_url)))
+        answer = json.loads(subprocess.check_output([*here, "--silent"], cwd=tmp_path))
+        assert answer.get("state") is not None or answer.get("ready"), command
