@@ -24,7 +24,7 @@ from doorstate.training.weights import WeightsCard, save_weights
 
 Run = Callable[..., tuple[int, str, str]]
 REAL = Path(__file__).resolve().parents[1].parent / "shared" / "real"
-COMMANDS = ("simulate", "prepare", "train", "compare", "report", "resolution", "predict", "serve", "info")
+COMMANDS = ("simulate", "prepare", "train", "compare", "report", "resolution", "predict", "view", "serve", "info")
 
 
 @pytest.fixture(scope="session")

@@ -16,6 +16,7 @@ from doorstate.cli.data import prepare, simulate
 from doorstate.cli.resolution import resolution
 from doorstate.cli.service import serve
 from doorstate.cli.training import compare, report, train
+from doorstate.cli.viewing import view
 from doorstate.errors import DoorstateError
 
 app = typer.Typer(
@@ -27,7 +28,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
 )
-for command in (simulate, prepare, train, compare, report, resolution, predict, serve, info):
+for command in (simulate, prepare, train, compare, report, resolution, predict, view, serve, info):
     app.command()(command)
 
 

@@ -17,7 +17,7 @@ from doorstate.deployment.answers import described
 from doorstate.errors import CloudReadError, ConfigError, DoorstateError
 
 if TYPE_CHECKING:
-    from doorstate.clouds.bags import StampedCloud
+    from doorstate.clouds.bags import BagTopic, StampedCloud
     from doorstate.clouds.io import ReadOptions
 
 Write = Callable[[dict[str, Any]], None]
@@ -34,7 +34,7 @@ def predict_bag(
     as_json: bool,
 ) -> None:
     """Answer the messages of one topic into a file, or onto standard output as a table or JSON lines."""
-    from doorstate.clouds.bags import CLOUD, open_bag
+    from doorstate.clouds.bags import open_bag
     from doorstate.console import err, progress_bar
 
     count = failures = 0
@@ -42,12 +42,10 @@ def predict_bag(
         chosen = bag.choose(topic)
         total = -(-chosen.messages // every)
         clouds = bag.clouds(chosen, options, camera_info_topic, every)
-        looks_optical = chosen.type == CLOUD and options.frame == "body"
         with _destination(out, as_json) as write, progress_bar("Predicting") as progress:
             for answer, frame_id in _answers(predictor, clouds):
-                if looks_optical and count == 0 and "optical" in frame_id:
-                    hint = f"{chosen.name} is in the frame {frame_id}: is --frame optical missing?"
-                    err.print(hint, markup=False, soft_wrap=True)
+                if count == 0:
+                    hint_at_frame(chosen, options, frame_id)
                 write(answer)
                 count += 1
                 failures += "error" in answer
@@ -55,6 +53,16 @@ def predict_bag(
     if failures:
         err.print(f"{failures} of {count} messages could not be answered")
         raise typer.Exit(1)
+
+
+def hint_at_frame(topic: BagTopic, options: ReadOptions, frame_id: str) -> None:
+    """Say so where clouds that are taken as they are come in an optical frame."""
+    from doorstate.clouds.bags import CLOUD
+    from doorstate.console import err
+
+    if topic.type == CLOUD and options.frame == "body" and "optical" in frame_id:
+        hint = f"{topic.name} is in the frame {frame_id}: is --frame optical missing?"
+        err.print(hint, markup=False, soft_wrap=True)
 
 
 def _answers(predictor: Any, clouds: Iterable[StampedCloud]) -> Iterator[tuple[dict[str, Any], str]]:

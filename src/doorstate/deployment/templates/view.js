@@ -1,0 +1,190 @@
+(() => {
+  const { data } = clouds;
+  const entries = [];
+  const MOST = 300; // of a stream; older ones are forgotten
+  const MUTED = "rgba(128,128,128,.45)";
+  const HEAT = [[0, "#9aa3ae"], [0.3, "#f2b632"], [0.65, "#ee6a1f"], [1, "#d3114f"]];
+  const colors = ["part", "height", "channels"];
+  const dark = matchMedia("(prefers-color-scheme: dark)");
+  const element = (id) => document.getElementById(id);
+  const [plot, list, follow] = [element("plot"), element("list"), element("follow")];
+  let current = -1;
+  let forgotten = 0; // of the stream's first
+  let wanted = null; // colour that was asked for
+
+  const make = (tag, properties = {}, ...children) => {
+    const made = Object.assign(document.createElement(tag), properties);
+    made.append(...children);
+    return made;
+  };
+  const words = (state) => state.replace("_", "-");
+  const tinted = (node, state) => (node.style.setProperty("--c", data.state_colors[state]), node);
+  const dot = (state) => (state ? tinted(make("i"), state) : make("i"));
+  const said = ({ answer, error }) => (error ? "error" : answer.state ? words(answer.state) : "no answer");
+  const isWrong = ({ truth, answer }) => truth !== "" && answer && answer.state !== null && answer.state !== truth;
+
+  // ---- colours ---------------------------------------------------------------------------------------------
+  const can = (entry, color) =>
+    color === "height" || Boolean(color === "part" ? entry.cloud.parts : entry.channels);
+
+  function channelsOf(entry) {
+    const raw = new DataView(clouds.bytes(entry.channels).buffer);
+    return Float32Array.from({ length: raw.byteLength / 2 }, (_, i) => raw.getUint16(2 * i, true) / data.channel_parts);
+  }
+
+  function byChannels(cloud, channels) {
+    const everyone = clouds.everyPoint(cloud);
+    const [seen, passed] = [everyone.filter((i) => channels[i] > 0), everyone.filter((i) => !(channels[i] > 0))];
+    const values = seen.map((i) => channels[i]);
+    const high = [...values].sort((a, b) => a - b)[Math.floor(0.98 * values.length)] || 1;
+    const looked = clouds.points(cloud, seen, "looked at", {
+      size: values.map((value) => 2.5 + 4 * Math.sqrt(Math.min(1, value / high))), line: { width: 0 },
+      color: values, colorscale: HEAT, cmin: 0, cmax: high, showscale: true,
+      colorbar: { title: { text: "channels", side: "top" }, thickness: 10, len: 0.6, outlinewidth: 0 },
+    }, "<br>%{marker.color:.1f} channels");
+    return [clouds.points(cloud, passed, "passed over", { size: 1.5, color: MUTED }), looked];
+  }
+
+  function traces(entry, color) {
+    const cloud = clouds.decode(entry.cloud);
+    const points = color === "part" ? clouds.byPart(cloud)
+      : color === "channels" ? byChannels(cloud, channelsOf(entry)) : clouds.byHeight(cloud);
+    return [...points, clouds.camera(), ...entry.shapes.map((shape) => clouds.shape(shape, shape.name))];
+  }
+
+  const NOTES = {
+    part: "Parts are known: this cloud is simulated.",
+    height: "",
+    channels: "How many channels of the network's global feature come from each point (the critical points of its maximum).",
+  };
+
+  // ---- one cloud -------------------------------------------------------------------------------------------
+  function draw() {
+    const entry = entries[current];
+    plot.hidden = !entry?.cloud;
+    const color = entry?.cloud && ([wanted, ...colors].find((each) => each && can(entry, each)));
+    for (const chip of document.querySelectorAll("[data-color]")) {
+      chip.hidden = !entries.some((each) => each.cloud && can(each, chip.dataset.color));
+      chip.setAttribute("aria-pressed", String(chip.dataset.color === color));
+    }
+    element("note").textContent = color ? NOTES[color] : "";
+    if (!color) return;
+    const layout = clouds.layout();
+    layout.uirevision = layout.scene.uirevision = "stay"; // the eye stays where the user put it
+    clouds.plotly().react(plot, traces(entry, color), layout, clouds.config);
+  }
+
+  function tell(entry) {
+    const { answer } = entry;
+    element("name").textContent = document.title = entry.name;
+    const state = element("state");
+    state.replaceChildren(dot(answer?.state), said(entry));
+    if (entry.truth) {
+      state.append(make("span", { className: isWrong(entry) ? "badge warn" : "badge" }, `truth: ${words(entry.truth)}`));
+    }
+    element("probabilities").replaceChildren(...(answer?.state ? data.states : []).flatMap(
+      (name) => {
+        const p = answer.probabilities[name];
+        const filled = tinted(make("i"), name);
+        filled.style.width = `${100 * p}%`;
+        return [make("dt", {}, words(name)), make("dd", { className: "bar" }, filled),
+          make("dd", { className: "number" }, `${(100 * p).toFixed(1)} %`)];
+      }));
+    element("reason").textContent = entry.error || answer?.reason || "";
+    element("facts").textContent = answer ? [
+      answer.opening_angle_deg === undefined ? "" : `opened ${answer.opening_angle_deg.toFixed(0)}°`,
+      `${answer.points.toLocaleString("en")} points`, `${answer.milliseconds.toFixed(0)} ms`,
+    ].filter(Boolean).join(", ") : "";
+  }
+
+  function show(index) {
+    if (index < 0 || index >= entries.length) return;
+    list.children[current]?.firstChild.removeAttribute("aria-current");
+    current = index;
+    const chosen = list.children[current].firstChild;
+    chosen.setAttribute("aria-current", "true");
+    chosen.scrollIntoView({ block: "nearest" });
+    place();
+    tell(entries[current]);
+    if (!data.live) history.replaceState(null, "", `#${current + 1}`);
+    draw();
+  }
+
+  function place() {
+    element("place").textContent = entries.length ? `${forgotten + current + 1} / ${forgotten + entries.length}` : "";
+    element("previous").disabled = current <= 0;
+    element("next").disabled = current >= entries.length - 1;
+  }
+
+  // ---- all clouds ------------------------------------------------------------------------------------------
+  function add(entry) {
+    entries.push(entry);
+    const state = make("span", { className: isWrong(entry) || entry.error ? "wrong" : "" }, dot(entry.answer?.state), said(entry));
+    list.append(make("li", {}, make("button", { type: "button" }, make("b", {}, entry.name), state)));
+  }
+
+  const step = (by) => {
+    setFollow(false);
+    show(current + by);
+  };
+  const setFollow = (on) => follow?.setAttribute("aria-pressed", String(on));
+  const isFollowing = () => follow?.getAttribute("aria-pressed") === "true";
+
+  element("previous").addEventListener("click", () => step(-1));
+  element("next").addEventListener("click", () => step(1));
+  follow?.addEventListener("click", () => {
+    setFollow(!isFollowing());
+    if (isFollowing()) show(entries.length - 1);
+  });
+  list.addEventListener("click", (event) => {
+    const item = event.target.closest("li");
+    if (item) step([...list.children].indexOf(item) - current);
+  });
+  document.addEventListener("keydown", (event) => {
+    if (event.altKey || event.ctrlKey || event.metaKey || event.shiftKey) return;
+    if (event.key === "ArrowLeft") step(-1);
+    else if (event.key === "ArrowRight") step(1);
+    else return;
+    event.preventDefault();
+  });
+  document.querySelector(".chips").addEventListener("click", (event) => {
+    const { color } = event.target.closest("button")?.dataset ?? {};
+    if (!color) return;
+    wanted = color;
+    draw();
+  });
+  dark.addEventListener("change", draw);
+  new ResizeObserver(() => { if (plot.data && !plot.hidden) window.Plotly.Plots.resize(plot); }).observe(plot);
+
+  data.entries.forEach(add);
+  show(Math.min(Math.max(1, Number.parseInt(location.hash.slice(1), 10) || 1), entries.length) - 1);
+
+  // ---- a stream --------------------------------------------------------------------------------------------
+  if (!data.live) return;
+  let isDue = false;
+  place();
+  draw();
+
+  function arrived(event) {
+    add(JSON.parse(event.data));
+    if (entries.length > MOST && current !== 0) {
+      entries.shift();
+      list.firstChild.remove();
+      [current, forgotten] = [current - 1, forgotten + 1];
+    }
+    place();
+    if (isDue || !(isFollowing() || current < 0)) return;
+    isDue = true; // several that arrive between two pictures are drawn as one, the last
+    requestAnimationFrame(() => {
+      isDue = false;
+      show(entries.length - 1);
+    });
+  }
+
+  const badge = element("connection");
+  const source = new EventSource("events");
+  source.addEventListener("open", () => { badge.textContent = "live"; });
+  source.addEventListener("error", () => { badge.textContent = "not connected"; });
+  source.addEventListener("cloud", arrived);
+  source.addEventListener("end", () => { badge.textContent = "ended"; source.close(); });
+})();

@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Clouds and what was said of them, as one HTML page that loads nothing from anywhere."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from doorstate.clouds.preparation import NUM_POINTS, prepare_cloud
+from doorstate.deployment.answers import described
+from doorstate.deployment.critical import critical_points
+from doorstate.deployment.predictor import Predictor
+from doorstate.deployment.rule_predictor import RulePredictor
+from doorstate.deployment.sightings import Sighting
+from doorstate.errors import DoorstateError
+from doorstate.evaluation.found_shapes import encode_shapes
+from doorstate.evaluation.pages import encode_bytes, encode_cloud, render_page
+from doorstate.evaluation.views import STATE_COLORS
+from doorstate.types import STATES
+
+Entry = dict[str, Any]
+"""One cloud as the page takes it; it holds an `error`, or an `answer` and a `cloud`."""
+
+_CHANNEL_PARTS = 32  # channels are counted in, so that two bytes hold 0 to 2047
+
+
+def look(predictor: Predictor | RulePredictor, sighting: Sighting) -> Entry:
+    """Ask for the state of a cloud, and keep the points that were looked at, at most 4096.
+
+    Args:
+        predictor: a network or a rule.
+        sighting: of a cloud.
+    """
+    entry: Entry = {"name": sighting.name, "truth": sighting.truth}
+    try:
+        if isinstance(sighting.cloud, DoorstateError):
+            raise sighting.cloud
+        answer = predictor(sighting.cloud)
+        if isinstance(predictor, Predictor):
+            prepared = prepare_cloud(sighting.cloud, predictor.points, thin=predictor.thin)
+        else:
+            prepared = prepare_cloud(sighting.cloud, NUM_POINTS, thin=True)
+    except DoorstateError as error:
+        return entry | {"error": str(error)}
+    channels = None
+    if isinstance(predictor, Predictor) and answer.state is not None:
+        channels = critical_points(predictor.network, prepared.points)
+    parts = None if sighting.parts is None else sighting.parts[prepared.indices[:NUM_POINTS]]
+    if channels is not None:
+        counted = np.rint(channels[:NUM_POINTS] * _CHANNEL_PARTS).astype("<u2")
+        entry["channels"] = encode_bytes(counted.tobytes())
+    return entry | {
+        "answer": described(answer),
+        "cloud": encode_cloud(prepared.points[:NUM_POINTS], parts),
+        "shapes": encode_shapes(answer.found),
+    }
+
+
+def render_view(predictor: Predictor | RulePredictor, entries: Sequence[Entry], *, live: bool = False) -> str:
+    """The page.
+
+    Args:
+        predictor: who was asked.
+        entries: of `look`; may be none in a live page.
+        live: more entries come as server-sent events from `events` beside the page.
+    """
+    if isinstance(predictor, Predictor):
+        asked = f"{predictor.card.network}, {predictor.points} points"
+    else:
+        asked = f"rule {predictor.rule.name}"
+    return render_page(
+        "view.html.j2",
+        "doorstate.deployment",
+        asked=asked,
+        live=live,
+        page_data={
+            "entries": list(entries),
+            "live": live,
+            "states": STATES,
+            "state_colors": STATE_COLORS,
+            "channel_parts": _CHANNEL_PARTS,
+        },
+    )
