@@ -32,7 +32,8 @@ _FLAGS = (
 # The browser reads commands from descriptor 3 and writes to 4.
 _ON_DESCRIPTORS = (
     "import os, sys; r, w = (os.dup(int(fd)) for fd in sys.argv[1:3]); "
-    "os.dup2(r, 3); os.dup2(w, 4); os.execv(sys.argv[3], sys.argv[3:])"
+    "os.dup2(r, 3); os.dup2(w, 4); [os.set_inheritable(fd, True) for fd in (3, 4)]; "
+    "os.execv(sys.argv[3], sys.argv[3:])"
 )
 
 

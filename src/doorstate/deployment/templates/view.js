@@ -103,7 +103,10 @@
     current = index;
     const chosen = list.children[current].firstChild;
     chosen.setAttribute("aria-current", "true");
-    chosen.scrollIntoView({ block: "nearest" });
+    const top = chosen.offsetTop - list.offsetTop; // the list is scrolled, and never the page
+    if (top < list.scrollTop || top + chosen.offsetHeight > list.scrollTop + list.clientHeight) {
+      list.scrollTop = top - list.clientHeight / 2;
+    }
     place();
     tell(entries[current]);
     if (!data.live) history.replaceState(null, "", `#${current + 1}`);
