@@ -8,17 +8,24 @@ import math
 import os
 import subprocess
 import sys
+import time
+import warnings
 from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import torch
+from benchmarks import fuzz
+from benchmarks.fuzz import OUTCOMES, TARGETS
 from benchmarks.gate import FAULTS
 
 from doorstate.dataset.store import PreparedDataset
+from doorstate.deployment.predictor import Prediction
 from doorstate.errors import ConfigError, RunError
 from doorstate.jobs import no_progress
+from doorstate.types import DoorState
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 TINY = ("--points", "128", "--batch", "2", "--repeats", "1", "--threads", "1")
@@ -293,3 +300,77 @@ def test_the_service_is_loaded_by_every_number_of_clients(tmp_path: Path) -> Non
         assert min(row["memory_mib"]) > 100
     assert "| 3 |" in markdown
     assert "The service under load" in output
+
+
+def test_bad_input_is_counted_by_what_becomes_of_it(tmp_path: Path) -> None:
+    code, output, errors = run("fuzz", "--inputs", 60, "--first", 7, "--out", tmp_path)
+    assert (code, errors) == (0, "")
+    settings, rows, markdown = stored(tmp_path, "fuzz")
+    assert settings["first"] == 7
+    assert [row["target"] for row in rows] == list(TARGETS)
+    assert sum(row[outcome] for row in rows for outcome in OUTCOMES) == 60
+    assert sum(row["refused"] for row in rows) > 20
+    assert sum(row["answered"] for row in rows) > 0
+    assert "| all | 60 |" in markdown
+    assert "Bad input" in output
+
+
+def test_inputs_that_make_something_fail_are_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fuzz, "Worker", Careless)
+    rows = fuzz.measure(0, 40, None, 1, tmp_path, no_progress)
+    failures = {failure["number"]: failure for row in rows for failure in row["failures"]}
+    assert set(failures) == set(range(0, 40, 10))
+    assert {failure["outcome"] for failure in failures.values()} == {"crash"}
+    assert "killed by SIGSEGV" in failures[0]["detail"]
+    assert "0: crash, killed by SIGSEGV" in fuzz.fuzz_table(rows, 0).to_markdown()
+    assert sorted(int(path.name.partition("-")[0]) for path in tmp_path.iterdir()) == sorted(failures)
+
+
+class Careless:
+    """A worker whose reader dies of every tenth input."""
+
+    def __init__(self, factory: object, scratch: Path) -> None:
+        self._dead = False
+
+    def call(self, method: str, number: int) -> Any:
+        assert not self._dead
+        if method == "draw":
+            return ".pcd", (".pcd", b"content")
+        if number % 10 == 0:
+            self._dead = True
+            raise RunError("killed by SIGSEGV")
+        return ".pcd", "refused", ""
+
+    def close(self) -> None:
+        """Nothing runs."""
+
+
+@pytest.mark.parametrize(
+    ("fault", "outcome"),
+    [("raise ValueError", "crash"), ("warn", "crash"), ("spin", "hang"), ("answer", "answer without data")],
+)
+def test_the_fuzzer_sees_what_it_looks_for(
+    fault: str, outcome: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def parse(data: bytes, suffix: str, options: object) -> np.ndarray:
+        if fault == "raise ValueError":
+            raise ValueError(fault)
+        if fault == "warn":
+            warnings.warn("look here", RuntimeWarning, stacklevel=1)
+        if fault == "spin":
+            until = time.process_time() + 0.1
+            while time.process_time() < until:
+                pass
+        return np.full((200, 3), np.nan, np.float32)
+
+    def careless(points: np.ndarray) -> Prediction:
+        return Prediction(DoorState.OPEN, {"open": 1.0}, 0, 0.0)
+
+    fuzzer = fuzz.Fuzzer(tmp_path)
+    monkeypatch.setattr(fuzz, "parse_cloud", parse)
+    monkeypatch.setattr(fuzz, "LIMIT_S", 0.1)
+    if fault == "answer":
+        monkeypatch.setattr(fuzzer, "_predict", careless)
+        monkeypatch.setattr(fuzzer, "_gated", careless)
+    number = next(number for number in range(100) if fuzzer.draw(number)[0] == ".pcd")
+    assert fuzzer.attempt(number)[:2] == (".pcd", outcome)

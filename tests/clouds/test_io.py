@@ -3,24 +3,24 @@
 
 from __future__ import annotations
 
-import io
 import os
 import tracemalloc
 import warnings
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from benchmarks.mutations import EDITS, TOKENS, Edit, bomb, mutate, saved
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from PIL import Image
 
 from doorstate.clouds.camera import Intrinsics, Pinhole
+from doorstate.clouds.declared import MAX_POINTS
 from doorstate.clouds.depth import depth_to_points
-from doorstate.clouds.io import CLOUD_SUFFIXES, ReadOptions, find_clouds, read_cloud
+from doorstate.clouds.io import CLOUD_SUFFIXES, ReadOptions, find_clouds, parse_cloud, read_cloud
 from doorstate.clouds.pcd import write_pcd
 from doorstate.errors import CameraError, CloudError, CloudReadError
 
@@ -42,12 +42,6 @@ def _write(folder: Path, name: str, data: bytes | str) -> Path:
     return path
 
 
-def _saved(save: Callable[[io.BytesIO], Any]) -> bytes:
-    stream = io.BytesIO()
-    save(stream)
-    return stream.getvalue()
-
-
 def _pcd_bytes(folder: Path) -> bytes:
     write_pcd(folder / "valid.pcd", POINTS)
     return (folder / "valid.pcd").read_bytes()
@@ -60,12 +54,12 @@ def valid(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
     return {
         ".pcd": _pcd_bytes(tmp_path_factory.mktemp("valid")),
         ".ply": PLY_HEADER + b"end_header\n" + POINTS.tobytes(),
-        ".npy": _saved(lambda stream: np.save(stream, POINTS)),
-        ".npz": _saved(lambda stream: np.savez_compressed(stream, cloud=POINTS)),
+        ".npy": saved(lambda stream: np.save(stream, POINTS)),
+        ".npz": saved(lambda stream: np.savez_compressed(stream, cloud=POINTS)),
         ".xyz": rows.encode(),
         ".txt": rows.replace(" ", ";").encode(),
         ".csv": b"x,y,z\n" + rows.replace(" ", ",").encode(),
-        ".png": _saved(lambda stream: Image.fromarray(DEPTH_MM).save(stream, "PNG")),
+        ".png": saved(lambda stream: Image.fromarray(DEPTH_MM).save(stream, "PNG")),
     }
 
 
@@ -157,7 +151,7 @@ def test_depth_without_a_camera_names_the_flags(tmp_path: Path, valid: dict[str,
 
 
 def test_a_pinhole_takes_every_image_size(tmp_path: Path) -> None:
-    path = _write(tmp_path, "depth.png", _saved(lambda f: Image.fromarray(DEPTH_MM).save(f, "PNG")))
+    path = _write(tmp_path, "depth.png", saved(lambda f: Image.fromarray(DEPTH_MM).save(f, "PNG")))
     pinhole = Pinhole(CAMERA.fx, CAMERA.fy, CAMERA.cx, CAMERA.cy)
     exact = read_cloud(path, ReadOptions(intrinsics=CAMERA))
     np.testing.assert_array_equal(read_cloud(path, ReadOptions(intrinsics=pinhole)), exact)
@@ -226,7 +220,7 @@ _HUGE = 10**12
 _PCD = "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nPOINTS {n}\nDATA {kind}\n"
 _PACKED_SIZES = (12).to_bytes(4, "little") + (3_600_000_000).to_bytes(4, "little")
 _PLY = PLY_HEADER.replace(b"vertex 4", b"vertex %d" % _HUGE) + b"end_header\n"
-_NPY = _saved(lambda stream: np.save(stream, np.zeros((4, 3))))
+_NPY = saved(lambda stream: np.save(stream, np.zeros((4, 3))))
 LIARS = {
     "ascii.pcd": _PCD.format(n=_HUGE, kind="ascii").encode(),
     "binary.pcd": _PCD.format(n=_HUGE, kind="binary").encode(),
@@ -252,26 +246,9 @@ def test_a_declared_size_is_checked_before_anything_is_allocated(tmp_path: Path,
     assert peak_bytes < 4e6
 
 
-def _mutate(data: bytes, edits: list[tuple[str, int, bytes]]) -> bytes:
-    mutated = bytearray(data)
-    for kind, place, content in edits:
-        start = place % (len(mutated) + 1)
-        match kind:
-            case "replace":
-                mutated[start : start + len(content)] = content
-            case "insert":
-                mutated[start:start] = content
-            case "delete":
-                del mutated[start : start + len(content)]
-            case "cut":
-                del mutated[start:]
-    return bytes(mutated)
-
-
-_TOKENS = (b"0", b"9", b"-1", b"99999999999", b"nan", b"\n", b" ", b",", b"x", b"#", b"\xff" * 4, b"\0" * 4)
-_contents = st.binary(min_size=1, max_size=4) | st.sampled_from(_TOKENS)
+_contents = st.binary(min_size=1, max_size=4) | st.sampled_from(TOKENS)
 _edits = st.lists(
-    st.tuples(st.sampled_from(["replace", "insert", "delete", "cut"]), st.integers(0, 1000), _contents),
+    st.tuples(st.sampled_from(EDITS), st.integers(0, 1000), _contents),
     min_size=1,
     max_size=4,
 )
@@ -284,11 +261,11 @@ def test_damaged_files_are_read_or_are_cloud_errors(
     tmp_path_factory: pytest.TempPathFactory,
     valid: dict[str, bytes],
     suffix: str,
-    edits: list[tuple[str, int, bytes]],
+    edits: list[Edit],
     noise: bytes | None,
 ) -> None:
     path = tmp_path_factory.getbasetemp() / f"fuzz{suffix}"
-    path.write_bytes(_mutate(valid[suffix], edits) if noise is None else noise)
+    path.write_bytes(mutate(valid[suffix], edits) if noise is None else noise)
     for options in (ReadOptions(), ReadOptions(intrinsics=CAMERA, frame="optical", roll_deg=90)):
         outcome = _points_or_error(path, options)
         if isinstance(outcome, Exception):
@@ -297,6 +274,20 @@ def test_damaged_files_are_read_or_are_cloud_errors(
             assert outcome.dtype == np.float32
             assert outcome.ndim in (2, 3)
             assert outcome.shape[-1] == 3
+
+
+@pytest.mark.parametrize("suffix", [".npz", ".png", ".pcd"])
+def test_what_unpacks_to_more_than_a_camera_has_is_refused(suffix: str) -> None:
+    packed = bomb(suffix, MAX_POINTS + 4096)
+    tracemalloc.start()
+    try:
+        with pytest.raises(CloudReadError, match=f"holds {MAX_POINTS + 4096} points: not one camera frame"):
+            parse_cloud(packed, suffix, ReadOptions(intrinsics=Pinhole(1, 1, 0, 0)))
+        peak_bytes = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    # An archive only tells when it is unpacked: 12 bytes a point, twice.
+    assert peak_bytes < (220e6 if suffix == ".npz" else 30e6)
 
 
 def _points_or_error(path: Path, options: ReadOptions) -> NDArray[np.float32] | CloudError | CameraError:

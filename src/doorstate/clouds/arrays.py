@@ -12,13 +12,13 @@ import numpy as np
 from numpy.lib import format as npy_format
 from numpy.typing import NDArray
 
-from doorstate.clouds.declared import check_declared
+from doorstate.clouds.declared import MAX_POINTS, check_declared
 from doorstate.errors import CloudReadError
 
 # Names that say what an array is, best first.
 ARRAY_NAMES = ("points", "cloud", "xyz", "depth")
-# 12 megapixels of x, y, z in float64 take 0.3 GB: an archive member that unpacks to more is a zip bomb.
-_MAX_MEMBER_BYTES = 1 << 30
+# Four float64 for every point: an archive member that unpacks to more is a zip bomb.
+_MAX_MEMBER_BYTES = 32 * MAX_POINTS
 
 
 def parse_npy(data: bytes) -> NDArray[Any]:

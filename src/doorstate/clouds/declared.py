@@ -5,6 +5,9 @@ from __future__ import annotations
 
 from doorstate.errors import CloudReadError
 
+# The largest depth cameras have 8 megapixels. A file may pack far more into a few bytes.
+MAX_POINTS = 1 << 23
+
 
 def check_declared(declared: int, present: int, unit: str) -> None:
     """Raise CloudReadError when a negative number of units is declared, or more than is present."""
@@ -12,3 +15,9 @@ def check_declared(declared: int, present: int, unit: str) -> None:
         raise CloudReadError(f"is damaged: {declared} {unit} are declared")
     if declared > present:
         raise CloudReadError(f"is truncated: {declared} {unit} are declared, {present} are there")
+
+
+def check_points(count: int) -> None:
+    """Raise CloudReadError when there are more points or pixels than a depth camera has."""
+    if count > MAX_POINTS:
+        raise CloudReadError(f"holds {count} points: not one camera frame (at most {MAX_POINTS})")

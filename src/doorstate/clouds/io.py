@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from doorstate.clouds.arrays import parse_npy, parse_npz
 from doorstate.clouds.camera import Intrinsics, Pinhole
+from doorstate.clouds.declared import check_points
 from doorstate.clouds.depth import depth_to_points, points_from_optical, undo_roll
 from doorstate.clouds.pcd import parse_pcd
 from doorstate.clouds.ply import parse_ply
@@ -155,6 +156,7 @@ def parse_cloud(data: bytes, suffix: str, options: ReadOptions = DEFAULT_OPTIONS
             warnings.simplefilter("ignore")
             stored = _PARSERS[suffix](data)
             is_depth = suffix == ".png" or (stored.ndim == 2 and stored.shape[1] > _MAX_POINT_VALUES)
+            check_points(math.prod(stored.shape if is_depth else stored.shape[:-1]))
             return points_from_depth(stored, options) if is_depth else _points_from_rows(stored, options)
     except DoorstateError:
         raise

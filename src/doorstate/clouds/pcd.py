@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pypcd4.pypcd4 import Encoding, MetaData, PointCloud
 
-from doorstate.clouds.declared import check_declared
+from doorstate.clouds.declared import check_declared, check_points
 from doorstate.clouds.tables import parse_rows
 from doorstate.errors import CloudContentError, CloudReadError
 from doorstate.files import atomic_path
@@ -51,6 +51,7 @@ def parse_pcd(data: bytes) -> NDArray[Any]:
 
 def _parse_rows(metadata: MetaData, body: bytes) -> NDArray[Any]:
     encoding = metadata.data
+    check_points(metadata.points)
     if metadata.points == 0:
         return np.empty((0, 3), dtype=np.float32)
     if encoding is Encoding.ASCII:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from doorstate.clouds.declared import check_points
 from doorstate.errors import CloudReadError
 
 # PNG specification, IHDR: the first chunk holds width, height, bit depth and colour type (0 is grey).
@@ -41,5 +42,9 @@ def parse_depth_png(data: bytes) -> NDArray[np.uint16]:
         raise CloudReadError(
             f"is truncated: {width} x {height} pixels are declared, {len(data)} bytes are there"
         )
-    with Image.open(io.BytesIO(data), formats=["PNG"]) as image:
-        return np.asarray(image).astype(np.uint16)
+    check_points(width * height)
+    try:
+        with Image.open(io.BytesIO(data), formats=["PNG"]) as image:
+            return np.asarray(image).astype(np.uint16)
+    except Exception as error:  # Pillow raises anything on damaged bytes
+        raise CloudReadError(f"is a damaged PNG image ({type(error).__name__}: {error})") from error
