@@ -20,9 +20,9 @@ from doorstate.deployment import predictor
 from doorstate.evaluation.table import Table
 from doorstate.jobs import Progress
 from doorstate.networks import create_network
+from doorstate.training.card import WeightsCard
 from doorstate.training.environment import keep_freed_memory
 from doorstate.training.fit import threads as use_threads
-from doorstate.training.weights import WeightsCard
 from doorstate.types import Points
 
 STAGES = ("clean", "sample", "network", "total")

@@ -10,6 +10,7 @@ DoorstateError
 ├── DatasetError           a data set folder is missing, incomplete or inconsistent
 ├── RunError               a training run or comparison folder cannot be used or continued
 ├── WeightsError           a weights file is missing, damaged, or made for something else
+├── ExportError            a network cannot be exported, or the file would answer otherwise
 └── MissingExtraError      an optional package is needed and not installed
 """
 
@@ -50,6 +51,10 @@ class RunError(DoorstateError):
 
 class WeightsError(DoorstateError):
     """A weights file is missing, damaged, or made for another network."""
+
+
+class ExportError(DoorstateError):
+    """A network cannot be exported, or the file would answer otherwise."""
 
 
 class MissingExtraError(DoorstateError):

@@ -13,6 +13,7 @@ import typer
 
 from doorstate.cli.answers import info, predict
 from doorstate.cli.data import prepare, simulate
+from doorstate.cli.export import export
 from doorstate.cli.resolution import resolution
 from doorstate.cli.service import serve
 from doorstate.cli.training import compare, report, train
@@ -28,7 +29,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
 )
-for command in (simulate, prepare, train, compare, report, resolution, predict, view, serve, info):
+for command in (simulate, prepare, train, compare, report, resolution, predict, view, serve, export, info):
     app.command()(command)
 
 

@@ -9,19 +9,21 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
-from doorstate.clouds.preparation import NUM_POINTS, PreparedCloud, normalize, prepare_cloud
+from doorstate.clouds.preparation import NUM_POINTS, PreparedCloud, prepare_cloud
 from doorstate.deployment.gate import Gate
-from doorstate.errors import ConfigError, WeightsError
-from doorstate.networks import list_networks
-from doorstate.networks.base import PointNetwork
+from doorstate.deployment.onnx_network import OnnxNetwork
+from doorstate.errors import ConfigError, MissingExtraError, WeightsError
 from doorstate.rules.base import Shape
-from doorstate.training.weights import WeightsCard, load_weights
+from doorstate.training.card import WeightsCard
 from doorstate.types import STATES, DoorState, Points
+
+if TYPE_CHECKING:
+    from doorstate.networks.base import PointNetwork
 
 DEFAULT_NETWORK = "pointnet2"
 DEFAULT_GATE = Gate()
@@ -48,18 +50,21 @@ class Predictor:
     Nothing in it changes after it is made, so any number of threads may call one predictor.
 
     Args:
-        network: classifier.
+        network: classifier, or an exported one, which needs no torch.
         card: of its weights.
         points: how many points to look at.
         thin: sample the points from some rows and columns of an organized cloud, which is several times quicker,
             and not from all as in training (clouds.preparation).
         gate: refuses clouds in which too much is missing, with a reason and no state; None refuses nothing.
         clock: seconds that pass, for `milliseconds` and time budgets.
+
+    Raises:
+        ConfigError: another number of points than an exported network takes.
     """
 
     def __init__(
         self,
-        network: PointNetwork,
+        network: PointNetwork | OnnxNetwork,
         card: WeightsCard,
         points: int = NUM_POINTS,
         *,
@@ -67,7 +72,17 @@ class Predictor:
         gate: Gate | None = DEFAULT_GATE,
         clock: Callable[[], float] = time.perf_counter,
     ) -> None:
-        self.network = network.eval()
+        if isinstance(network, OnnxNetwork):
+            if points != network.card.num_points:
+                raise ConfigError(
+                    f"{points} points asked for, but the .onnx file takes {network.card.num_points}: export it again"
+                )
+            self._classify = network.probabilities
+        else:
+            from doorstate.deployment.torch_network import TorchNetwork
+
+            self._classify = TorchNetwork(network, card.temperature).probabilities
+        self.network = network
         self.card = card
         self.points = points
         self.thin = thin
@@ -88,34 +103,36 @@ class Predictor:
         """Load packaged weights by network name, or any weights file by path.
 
         Args:
-            name_or_path: a name of `packaged_networks()`, or a `.safetensors` file.
+            name_or_path: a name of `packaged_networks()`, a `.safetensors` file, or an `.onnx` file of
+                `doorstate export`, which needs no torch.
             points: how many points to look at; None takes as many as the weights were trained with.
             thin: as of the class.
             gate: as of the class.
             budget_ms: in place of `points`: the most of `BUDGET_POINTS` that this machine, measured now, takes no more
                 time for, from a raw 640 x 480 cloud to an answer; the fewest if all take more, and never more
-                than the weights were trained with.
+                than the weights were trained with. An `.onnx` file takes the one number it was exported for.
             clock: as of the class.
 
         Raises:
             WeightsError: no such weights, or they cannot be used.
-            ConfigError: both points and a budget, or a budget that is no time.
+            ConfigError: both points and a budget, a budget that is no time, or points that an `.onnx` file does not
+                take.
+            MissingExtraError: what the file needs, torch or onnxruntime, is not installed.
         """
         if budget_ms is not None and (points is not None or not budget_ms > 0):
             raise ConfigError(
                 f"a budget of {budget_ms} ms with {points} points: give one of them, above zero"
             )
-        path = Path(name_or_path)
-        if path.suffix != ".safetensors":
-            path = packaged_weights(str(name_or_path))
-        network, card = load_weights(path)
+        network, card = _load(name_or_path)
 
         def looking_at(count: int) -> Predictor:
             return cls(network, card, count, thin=thin, gate=gate, clock=clock)
 
         if budget_ms is None:
             return looking_at(points or card.num_points)
-        counts = [count for count in BUDGET_POINTS if count <= card.num_points] or [card.num_points]
+        exported = isinstance(network, OnnxNetwork)
+        counts = [] if exported else [count for count in BUDGET_POINTS if count <= card.num_points]
+        counts = counts or [card.num_points]
         chosen = looking_at(counts[0])
         for count in counts[1:]:
             larger = looking_at(count)
@@ -169,16 +186,28 @@ class Predictor:
 
     def _probabilities(self, prepared: list[PreparedCloud]) -> NDArray[np.float32]:
         """(B, 3) of clouds with equally many points."""
-        normalized = normalize(np.stack([cloud.points for cloud in prepared]))
-        with torch.inference_mode():
-            logits = self.network(torch.from_numpy(normalized))
-            calibrated: NDArray[np.float32] = (logits / self.card.temperature).softmax(1).numpy()
-        return calibrated
+        return self._classify(np.stack([cloud.points for cloud in prepared]))
 
     def warm_up(self) -> None:
         """Run once on noise, so that the first real cloud is as quick as the others."""
         cloud = np.random.default_rng(0).normal(2.0, 1.0, (self.points, 3)).astype(np.float32)
         self._probabilities([prepare_cloud(cloud, self.points)])
+
+
+def _load(name_or_path: str | Path) -> tuple[PointNetwork | OnnxNetwork, WeightsCard]:
+    path = Path(name_or_path)
+    if path.suffix == ".onnx":
+        exported = OnnxNetwork(path)
+        return exported, exported.card
+    if path.suffix != ".safetensors":
+        path = packaged_weights(str(name_or_path))
+    try:
+        from doorstate.training.weights import load_weights
+    except ImportError as error:
+        raise MissingExtraError(
+            f"{path.name} needs the package {error.name}: install it, or give an .onnx file made by doorstate export"
+        ) from error
+    return load_weights(path)
 
 
 def _typical_milliseconds(predictor: Predictor) -> float:
@@ -199,7 +228,7 @@ def median_milliseconds(predictor: Predictor, clouds: Sequence[Points], repeats:
 
 def packaged_networks() -> list[str]:
     """Networks whose weights come with the package."""
-    return [name for name in list_networks() if _packaged(name).is_file()]
+    return sorted(path.stem for path in _packaged("").parent.glob("*.safetensors"))
 
 
 def packaged_weights(network: str) -> Path:

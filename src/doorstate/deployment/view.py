@@ -11,6 +11,7 @@ import numpy as np
 from doorstate.clouds.preparation import NUM_POINTS, prepare_cloud
 from doorstate.deployment.answers import described
 from doorstate.deployment.critical import critical_points
+from doorstate.deployment.onnx_network import OnnxNetwork
 from doorstate.deployment.predictor import Predictor
 from doorstate.deployment.rule_predictor import RulePredictor
 from doorstate.deployment.sightings import Sighting
@@ -45,7 +46,11 @@ def look(predictor: Predictor | RulePredictor, sighting: Sighting) -> Entry:
     except DoorstateError as error:
         return entry | {"error": str(error)}
     channels = None
-    if isinstance(predictor, Predictor) and answer.state is not None:
+    if (
+        isinstance(predictor, Predictor)
+        and not isinstance(predictor.network, OnnxNetwork)
+        and answer.state is not None
+    ):
         channels = critical_points(predictor.network, prepared.points)
     parts = None if sighting.parts is None else sighting.parts[prepared.indices[:NUM_POINTS]]
     if channels is not None:

@@ -137,6 +137,8 @@ def _nearest_of_all(query: Tensor, points: Tensor, k: int) -> Tensor:
     """Nearest neighbours by all distances: of coordinates by exact differences, of features by a matrix product."""
     find_distances = _coordinate_distances if points.shape[2] == 3 else _feature_distances
     block_size = max(1, _DISTANCES_PER_BLOCK // points.shape[1])
+    if torch.compiler.is_exporting():  # a graph would hold every block's operations
+        block_size = query.shape[1]
     found = []
     for start in range(0, query.shape[1], block_size):
         block = query[:, start : start + block_size]

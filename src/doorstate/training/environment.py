@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a result was made with."""
+"""What a result was made with.
+
+torch is imported where it is asked, since `keep_freed_memory` serves those who do without.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +16,6 @@ from pathlib import Path
 from typing import ParamSpec, TypeVar
 
 import numpy as np
-import torch
 
 from doorstate import __version__
 
@@ -25,6 +27,8 @@ _M_TRIM_THRESHOLD, _M_MMAP_MAX = -1, -4  # malloc.h of glibc
 
 def describe_environment() -> dict[str, str | int | bool]:
     """Versions, processor and threads."""
+    import torch
+
     return {
         "doorstate": __version__,
         "python": platform.python_version(),
@@ -64,6 +68,8 @@ def keep_freed_memory() -> None:
 
 def bf16_is_quick() -> bool:
     """Whether this machine multiplies bf16 matrices in hardware."""
+    import torch
+
     if torch.cuda.is_available():
         return bool(torch.cuda.is_bf16_supported())
     return bool(torch.cpu._is_avx512_bf16_supported() or torch.cpu._is_amx_tile_supported())
@@ -71,6 +77,7 @@ def bf16_is_quick() -> bool:
 
 def compiled(function: Callable[_P, _R]) -> Callable[_P, _R]:
     """A function through torch.compile, or as it is from the first time that fails, with one warning in the log."""
+    import torch
     from torch._dynamo.exc import TorchDynamoException  # takes a second to import
 
     quick: Callable[_P, _R] | None = torch.compile(function)

@@ -30,10 +30,11 @@ from doorstate.files import atomic_path
 from doorstate.networks import create_network
 from doorstate.networks.base import PointNetwork
 from doorstate.networks.layers import set_batchnorm
+from doorstate.training.card import WeightsCard
 from doorstate.training.environment import bf16_is_quick, compiled, describe_environment, keep_freed_memory
 from doorstate.training.recipes import Recipe, batchnorm_momentum, learning_rate, resolution_of_epoch
 from doorstate.training.run_folder import RunFolder, write_predictions
-from doorstate.training.weights import WeightsCard, load_into, read_card, save_weights
+from doorstate.training.weights import load_into, read_card, save_weights
 from doorstate.types import STATES
 
 _EVALUATION_BATCH = 32

@@ -7,32 +7,17 @@ import json
 from pathlib import Path
 
 import torch
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import ValidationError
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 
-from doorstate import __version__
 from doorstate.clouds.preparation import SCALE_M
 from doorstate.errors import WeightsError
 from doorstate.files import atomic_path
 from doorstate.networks import create_network
 from doorstate.networks.base import PointNetwork
+from doorstate.training.card import WeightsCard
 from doorstate.types import STATES
-
-
-class WeightsCard(BaseModel):
-    """What a weights file says of itself."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    network: str
-    network_options: dict[str, object] = {}
-    num_points: int
-    scale_m: float = SCALE_M
-    states: tuple[str, ...] = STATES
-    temperature: float = Field(default=1.0, gt=0)  # logits are divided by it (training.calibration)
-    trained_on: str = ""
-    doorstate_version: str = __version__
 
 
 def save_weights(path: Path, network: PointNetwork, card: WeightsCard, half: bool = False) -> None:

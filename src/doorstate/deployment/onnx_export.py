@@ -1,0 +1,229 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A network written as ONNX: points in metres go in, probabilities come out; checked and compared with torch."""
+
+from __future__ import annotations
+
+import copy
+import logging
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor, nn
+
+from doorstate import __version__
+from doorstate.clouds.preparation import SCALE_M, normalize, prepare_cloud
+from doorstate.deployment.onnx_network import CARD, INPUT, OUTPUT, OnnxNetwork
+from doorstate.deployment.torch_network import TorchNetwork
+from doorstate.errors import ConfigError, ExportError, MissingExtraError
+from doorstate.files import atomic_path
+from doorstate.jobs import Progress, no_progress
+from doorstate.networks.base import PointNetwork
+from doorstate.simulation.generate import PRESETS, draw_pose, pose_indices, replay
+from doorstate.training.card import WeightsCard
+from doorstate.types import STATES, Points
+
+if TYPE_CHECKING:
+    from onnx import ModelProto
+
+OPSET = 18  # what torch's exporter is written in; newer ones are converted from it
+TOLERANCE = 1e-4  # of a probability
+_SEED = 1_000_003  # of clouds that no weights were trained on
+_METADATA = {
+    "frame": "x forward, y left, z up, origin at the camera, gravity-aligned (ROS REP 103)",
+    "units": "metres",
+    "preparation": (
+        "drop points that are not finite or (0, 0, 0), then keep as many as the input takes in farthest-point order; "
+        f"centring and division by {SCALE_M} m are in the graph"
+    ),
+    "labels": ",".join(STATES),
+}
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """How far the file is from torch on the same clouds."""
+
+    largest: float  # difference in a probability
+    allowed: float
+    other_states: int  # clouds whose likeliest state is another
+    clouds: int
+
+
+class _Graph(nn.Module):
+    """Everything between sampled points in metres and probabilities."""
+
+    def __init__(self, network: PointNetwork, card: WeightsCard) -> None:
+        super().__init__()
+        self.network = network
+        self.temperature = card.temperature
+
+    def forward(self, points: Tensor) -> Tensor:
+        # As clouds.preparation.normalize, to the last digit: what is just inside a ball must not be just outside.
+        centroid = points.mean(1, keepdim=True, dtype=torch.float64).to(torch.float32)
+        logits: Tensor = self.network((points - centroid) / SCALE_M)
+        return (logits / self.temperature).softmax(1)
+
+
+def export_onnx(
+    path: Path,
+    network: PointNetwork,
+    card: WeightsCard,
+    clouds: Points,
+    *,
+    opset: int = OPSET,
+    int8: bool = False,
+    progress: Progress = no_progress,
+) -> Comparison:
+    """Write a network as an ONNX file that takes any number of clouds, after a comparison with torch.
+
+    Args:
+        path: of the file, which appears only if the comparison is passed.
+        network: classifier, in evaluation mode.
+        card: of its weights.
+        clouds: (M, n, 3) metres in farthest-point order to compare on; the file will take n points.
+        opset: version of ONNX's operators.
+        int8: keep the matrices of linear layers as 8-bit integers; then no difference is too large.
+        progress: of the comparison.
+
+    Raises:
+        MissingExtraError: a package of the extra `onnx` is not installed.
+        ExportError: the network cannot be exported, or the file answers otherwise than torch.
+    """
+    try:
+        import onnx
+        import onnxruntime  # noqa: F401 - the comparison comes last, and should not fail then
+        import onnxscript  # noqa: F401 - torch's exporter imports it
+    except ImportError as error:
+        raise MissingExtraError(
+            f'export needs the package {error.name}: pip install "doorstate[onnx]"'
+        ) from error
+    with atomic_path(path) as temporary:
+        with _quiet():
+            try:
+                model = _model(network, card, clouds.shape[1], opset)
+                onnx.save(model, temporary)
+                if int8:
+                    _quantize(temporary)
+                    model = onnx.load(temporary)
+                metadata = {CARD: card.model_copy(update={"num_points": clouds.shape[1]}).model_dump_json()}
+                onnx.helper.set_model_props(model, _METADATA | metadata)
+                model.producer_name, model.producer_version = "doorstate", __version__
+                onnx.checker.check_model(model, full_check=True)
+            except Exception as error:  # two compilers, which raise whatever they come across
+                reason = " ".join(str(error).split())[:160]
+                raise ExportError(
+                    f"{card.network} cannot be exported with opset {opset}: {reason}"
+                ) from error
+        onnx.save(model, temporary)
+        comparison = compare_with_torch(temporary, network, card, clouds, progress)
+        if not int8 and comparison.largest > comparison.allowed:
+            raise ExportError(
+                f"{path.name} not written: its probabilities differ from torch's by {comparison.largest:.1g}, "
+                f"more than {comparison.allowed:.1g}"
+            )
+    return comparison
+
+
+def compare_with_torch(
+    path: Path, network: PointNetwork, card: WeightsCard, clouds: Points, progress: Progress = no_progress
+) -> Comparison:
+    """Ask the file and torch about the same clouds, alone and in pairs.
+
+    Networks that choose neighbours among features (DGCNN) or weigh them in their order (PointCNN) turn a rounding error
+    into another neighbour, and then torch is as far from itself. So where the difference is above `TOLERANCE`, twice
+    torch's own distance from the same network in float64 is allowed.
+
+    Args:
+        path: a file of `export_onnx`.
+        network: what it was made of.
+        card: of its weights.
+        clouds: (M, n, 3) metres in farthest-point order.
+        progress: called after every cloud or pair.
+    """
+    exported, original = OnnxNetwork(path), TorchNetwork(network, card.temperature)
+    answers: list[NDArray[np.float32]] = []
+    expected: list[NDArray[np.float32]] = []
+    progress(0, len(clouds))
+    for alone in range(0, len(clouds), 3):
+        for some in (clouds[alone : alone + 1], clouds[alone + 1 : alone + 3]):
+            if len(some):
+                answers.append(exported.probabilities(some))
+                expected.append(original.probabilities(some))
+        progress(min(alone + 3, len(clouds)), len(clouds))
+    found, said = np.concatenate(answers), np.concatenate(expected)
+    largest, allowed = float(np.abs(found - said).max()), TOLERANCE
+    if largest > TOLERANCE:
+        allowed = max(TOLERANCE, 2 * float(np.abs(said - _in_float64(network, card, clouds)).max()))
+    other_states = int((found.argmax(1) != said.argmax(1)).sum())
+    return Comparison(largest, allowed, other_states, len(clouds))
+
+
+def comparison_clouds(count: int, num_points: int, progress: Progress = no_progress) -> Points:
+    """(count, num_points, 3) metres in farthest-point order: simulated doors in all three states.
+
+    Raises:
+        ConfigError: more points than a simulated cloud has.
+    """
+    clouds: list[Points] = []
+    for pose in pose_indices(-(-count // len(STATES)) + 2)[1:]:  # the first position is the ring's end
+        for row in draw_pose(PRESETS["ogurob"], _SEED, pose)[: count - len(clouds)]:
+            clouds.append(prepare_cloud(replay(row).points, num_points, thin=True).points)
+            progress(len(clouds), count)
+    fewest = min(map(len, clouds))
+    if fewest < num_points:
+        raise ConfigError(f"--points {num_points}: a simulated cloud has only {fewest} distinct points")
+    return np.stack(clouds)
+
+
+def _model(network: PointNetwork, card: WeightsCard, num_points: int, opset: int) -> ModelProto:
+    # Not one cloud: torch.export takes a size of one for a constant.
+    example = torch.linspace(-1, 1, 2 * num_points * 3).view(2, num_points, 3)
+    program = torch.onnx.export(
+        _Graph(network.eval(), card),
+        (example,),
+        dynamo=True,
+        opset_version=opset,
+        dynamic_shapes=({0: torch.export.Dim("batch")},),
+        input_names=[INPUT],
+        output_names=[OUTPUT],
+        verbose=False,
+    )
+    assert program is not None  # since `dynamo`
+    model: ModelProto = program.model_proto
+    if model.opset_import[0].version != opset:
+        raise ValueError(f"it comes out with opset {model.opset_import[0].version}")
+    return model
+
+
+def _quantize(path: Path) -> None:
+    from onnxruntime.quantization import QuantType, quantize_dynamic
+
+    quantize_dynamic(path, path, weight_type=QuantType.QInt8)
+
+
+def _in_float64(network: PointNetwork, card: WeightsCard, clouds: Points) -> NDArray[np.float64]:
+    exact = copy.deepcopy(network).double().eval()
+    with torch.inference_mode():
+        logits = [exact(torch.from_numpy(normalize(cloud))[None].double()) for cloud in clouds]
+        probabilities: NDArray[np.float64] = (torch.cat(logits) / card.temperature).softmax(1).numpy()
+    return probabilities
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Without what torch's exporter and the quantiser warn of: their own internals, and packages nobody asked for."""
+    before = logging.root.manager.disable
+    logging.disable(logging.WARNING)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    finally:
+        logging.disable(before)

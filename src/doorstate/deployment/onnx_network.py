@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A file of `doorstate export` asked by onnxruntime; torch is not needed."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from doorstate.errors import CloudContentError, MissingExtraError, WeightsError
+from doorstate.training.card import WeightsCard
+from doorstate.types import STATES, Points
+
+INPUT, OUTPUT = "points", "probabilities"
+CARD = "doorstate"  # of the file's metadata
+_ERRORS_ONLY = 3
+
+
+class OnnxNetwork:
+    """An exported network; preparation but for sampling, and the temperature, are in its graph.
+
+    Any number of threads may ask it.
+
+    Args:
+        path: the file.
+        threads: for one answer; None takes what the environment's OMP_NUM_THREADS says, as torch does, and all
+            processors if it says nothing.
+
+    Raises:
+        MissingExtraError: onnxruntime is not installed.
+        WeightsError: the file is missing, damaged, or not of `doorstate export`.
+    """
+
+    card: WeightsCard
+    """What the file says of itself; `num_points` is how many points it takes."""
+
+    def __init__(self, path: Path, threads: int | None = None) -> None:
+        try:
+            import onnxruntime
+        except ImportError as error:
+            raise MissingExtraError(
+                f'{path.name} needs the package onnxruntime: pip install "doorstate[onnx]"'
+            ) from error
+        if not path.is_file():
+            raise WeightsError(f"{path}: no such weights file")
+        options = onnxruntime.SessionOptions()
+        options.log_severity_level = _ERRORS_ONLY
+        options.intra_op_num_threads = _threads_by_environment() if threads is None else threads
+        try:
+            self._session = onnxruntime.InferenceSession(path, options, providers=["CPUExecutionProvider"])
+        except Exception as error:  # onnxruntime's errors have no common class of their own
+            reason = " ".join(str(error).split())[:160]
+            raise WeightsError(f"{path}: cannot be read as ONNX ({reason})") from error
+        try:
+            self.card = WeightsCard.model_validate_json(
+                self._session.get_modelmeta().custom_metadata_map[CARD]
+            )
+        except (KeyError, ValidationError) as error:
+            raise WeightsError(
+                f"{path}: not a file of `doorstate export`: its metadata lack {CARD}"
+            ) from error
+        if self.card.states != STATES:
+            raise WeightsError(f"{path}: made for states {self.card.states}")
+
+    def probabilities(self, points: Points) -> NDArray[np.float32]:
+        """(B, 3) probabilities of (B, n, 3) metres in farthest-point order.
+
+        Raises:
+            CloudContentError: n is not the number of points that the file takes.
+        """
+        if points.shape[1] != self.card.num_points:
+            raise CloudContentError(
+                f"too few points: {points.shape[1]} distinct, but the .onnx file takes {self.card.num_points}: "
+                "export it again with fewer --points"
+            )
+        answer: NDArray[np.float32] = self._session.run([OUTPUT], {INPUT: points})[0]
+        return answer
+
+
+def _threads_by_environment() -> int:
+    said = os.environ.get("OMP_NUM_THREADS", "")
+    return int(said) if said.isdecimal() else 0

@@ -1,0 +1,25 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What weights say of themselves, in every kind of file; apart from `weights`, which needs torch."""
+
+from __future__ import annotations
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from doorstate import __version__
+from doorstate.clouds.preparation import SCALE_M
+from doorstate.types import STATES
+
+
+class WeightsCard(BaseModel):
+    """What a weights file says of itself."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    network: str
+    network_options: dict[str, object] = {}
+    num_points: int
+    scale_m: float = SCALE_M
+    states: tuple[str, ...] = STATES
+    temperature: float = Field(default=1.0, gt=0)  # logits are divided by it (training.calibration)
+    trained_on: str = ""
+    doorstate_version: str = __version__
