@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -24,7 +25,18 @@ from doorstate.training.weights import WeightsCard, save_weights
 
 Run = Callable[..., tuple[int, str, str]]
 REAL = Path(__file__).resolve().parents[1].parent / "shared" / "real"
-COMMANDS = ("simulate", "prepare", "train", "compare", "report", "resolution", "predict", "view", "serve", "info")
+COMMANDS = (
+    "simulate",
+    "prepare",
+    "train",
+    "compare",
+    "report",
+    "resolution",
+    "predict",
+    "view",
+    "serve",
+    "info",
+)
 
 
 @pytest.fixture(scope="session")
@@ -127,6 +139,17 @@ def test_predict_json_is_one_object_a_line(
     assert (good["points"], few["points"]) == (256, 200)
     assert good["milliseconds"] > 0
     assert set(bad) == {"file", "error"}
+
+
+def test_a_name_that_is_no_text_can_be_printed(
+    run: Run, weights: Path, cloud: np.ndarray, tmp_path: Path
+) -> None:
+    path = tmp_path / os.fsdecode(b"\xff.npy")
+    np.save(path, cloud)
+    code, out, err = run("predict", path, "--weights", weights, "--json")
+    assert (code, err) == (0, "")
+    assert json.loads(out)["file"].endswith(r"\udcff.npy")
+    assert run("predict", path, "--weights", weights)[0] == 0
 
 
 def broken(kind: str, cloud: np.ndarray) -> np.ndarray:

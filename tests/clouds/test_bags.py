@@ -263,7 +263,7 @@ def test_depth_images_without_a_camera_are_one_line(info: Message, reason: str, 
         (compressed_image("/t", b"short", "16UC1; compressedDepth", START_NS), "is no PNG"),
         (
             compressed_image("/t", PNG_PARAMETERS + png(DEPTH_MM)[:-40], "16UC1; compressedDepth"),
-            "damaged message",
+            "is a damaged PNG image",
         ),
     ],
 )

@@ -20,7 +20,15 @@ from PIL import Image
 from doorstate.clouds.camera import Intrinsics, Pinhole
 from doorstate.clouds.declared import MAX_POINTS
 from doorstate.clouds.depth import depth_to_points
-from doorstate.clouds.io import CLOUD_SUFFIXES, ReadOptions, find_clouds, parse_cloud, read_cloud
+from doorstate.clouds.io import (
+    CLOUD_SUFFIXES,
+    ReadOptions,
+    find_clouds,
+    parse_cloud,
+    points_from_depth,
+    points_in_body,
+    read_cloud,
+)
 from doorstate.clouds.pcd import write_pcd
 from doorstate.errors import CameraError, CloudError, CloudReadError
 
@@ -308,6 +316,14 @@ def test_what_libraries_say_does_not_leak(tmp_path: Path, capfd: pytest.CaptureF
         assert np.isinf(read_cloud(huge)[0, 0])
     assert [str(warning.message) for warning in caught] == []
     assert capfd.readouterr() == ("", "")
+
+
+def test_signalling_nan_and_overflow_are_no_return_and_no_warning() -> None:
+    signalling = np.full((4, 20), 0x7FA00000, np.uint32).view(np.float32)
+    for stored in (signalling, np.full((4, 20), 3e38, np.float32)):
+        depth = points_from_depth(stored, ReadOptions(intrinsics=CAMERA, units_m=1000.0))
+        assert not np.isfinite(depth).any()
+        assert not np.isfinite(points_in_body(stored[:, :3], ReadOptions(units_m=1000.0))).any()
 
 
 def test_find_clouds_takes_files_as_given_and_searches_folders(tmp_path: Path) -> None:

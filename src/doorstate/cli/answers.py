@@ -148,7 +148,9 @@ def _predict_files(predictor: Any, paths: list[Path], options: ReadOptions, as_j
 def _answer(predictor: Any, path: Path, options: ReadOptions) -> dict[str, Any]:
     from doorstate.clouds.io import read_cloud
 
+    # A name may hold bytes that are no text, which cannot be printed.
+    file = {"file": str(path).encode(errors="backslashreplace").decode()}
     try:
-        return {"file": str(path)} | described(predictor(read_cloud(path, options)))
+        return file | described(predictor(read_cloud(path, options)))
     except DoorstateError as error:
-        return {"file": str(path), "error": str(error).removeprefix(f"{path.name}: ")}
+        return file | {"error": str(error).removeprefix(f"{path.name}: ")}

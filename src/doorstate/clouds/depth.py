@@ -42,9 +42,10 @@ def depth_to_points(depth_m: NDArray[np.floating], intrinsics: Intrinsics, roll_
     left_slope = (intrinsics.cx - np.arange(width)) / intrinsics.fx  # (W,)
     up_slope = (intrinsics.cy - np.arange(height)) / intrinsics.fy  # (H,)
     points = np.empty((height, width, 3), dtype=np.float32)
-    points[..., 0] = depth
-    points[..., 1] = depth * left_slope
-    points[..., 2] = depth * up_slope[:, None]
+    with np.errstate(over="ignore"):  # what overflows is as good as infinite: no return
+        points[..., 0] = depth
+        points[..., 1] = depth * left_slope
+        points[..., 2] = depth * up_slope[:, None]
     return undo_roll(points, roll_deg)
 
 

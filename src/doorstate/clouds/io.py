@@ -231,7 +231,8 @@ def points_from_depth(stored: NDArray[Any], options: ReadOptions) -> Points:
     if isinstance(intrinsics, Pinhole):
         intrinsics = Intrinsics(width, height, *intrinsics)
     scale_m = options.units_m if stored.dtype.kind == "f" else options.depth_scale_m
-    depth_m = stored.astype(np.float64) * scale_m
+    with np.errstate(invalid="ignore"):  # a NaN that signals is a NaN
+        depth_m = stored.astype(np.float64) * scale_m
     if stored.dtype.newbyteorder("=") == np.uint16:
         depth_m[stored == _NO_RETURN] = np.nan
     return depth_to_points(depth_m, intrinsics, options.roll_deg)
@@ -245,7 +246,7 @@ def _points_from_rows(stored: NDArray[Any], options: ReadOptions) -> Points:
 
 def points_in_body(stored: NDArray[Any], options: ReadOptions) -> Points:
     """Points (..., 3) in metres and in the body frame."""
-    with np.errstate(over="ignore"):  # what overflows is as good as infinite: no return
+    with np.errstate(over="ignore", invalid="ignore"):  # what overflows is as good as infinite: no return
         points = (stored.astype(np.float64) * options.units_m).astype(np.float32)
     if options.frame == "optical":
         points = points_from_optical(points)
