@@ -6,7 +6,7 @@ from __future__ import annotations
 import sys
 from importlib import import_module
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 from torch import Tensor, nn
 
@@ -32,6 +32,8 @@ class Form(NamedTuple):
 
 PLAIN, PORT, PYG = Form("plain fp32", "plain"), Form("port", "port"), Form("pyg", "pyg")
 BASELINES = (PLAIN, PORT, PYG)
+# Like with like: ports keep to 20 neighbours, DGCNN takes 40 from 2048 points on.
+AS_PORTS: dict[str, dict[str, Any]] = {"dgcnn": {"k": 20}}
 
 
 def forms_of(network: str, port: bool, pyg: bool, compiled: bool = False) -> list[Form]:
@@ -59,7 +61,7 @@ def build_form(form: Form, network: str, checkout: Path | None, points: Tensor) 
         return build_port(network, checkout)
     if form.kind == "pyg":
         return build_pyg(network)
-    ours = create_network(network)
+    ours = create_network(network, **AS_PORTS.get(network, {}))
     if form.kind == "plain":
         return plain_form(ours)
     if form.compiled:

@@ -14,7 +14,7 @@ from torch.utils._python_dispatch import TorchDispatchMode
 from torch.utils.flop_counter import flop_registry
 
 from benchmarks.clouds import Clouds
-from benchmarks.forms import Form, build_form, plain_form
+from benchmarks.forms import AS_PORTS, Form, build_form, plain_form
 from benchmarks.timing import peak_resident_mib, reset_peak, resident_mib, step_s
 from doorstate.networks import create_network
 from doorstate.training.environment import keep_freed_memory
@@ -113,7 +113,7 @@ class OperationCount:
     """Operations of the plain form's products on one cloud."""
 
     def __init__(self, network: str, clouds: Clouds) -> None:
-        self._form = plain_form(create_network(network).eval())
+        self._form = plain_form(create_network(network, **AS_PORTS.get(network, {})).eval())
         self._points = torch.from_numpy(clouds.points[:1])
 
     def training_gflop(self) -> float:

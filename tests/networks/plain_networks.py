@@ -186,7 +186,7 @@ def dgcnn(network: DGCNN, points: Tensor) -> tuple[Tensor, Tensor | float]:
     outputs = [points]
     with torch.autocast(points.device.type, enabled=False):  # in full precision, as the network
         for conv in network.convs:
-            outputs.append(edge_conv(outputs[-1], network.k, conv))
+            outputs.append(edge_conv(outputs[-1], network.num_neighbours(points.shape[1]), conv))
     rows = linear(torch.cat(outputs[1:], dim=-1), network.aggregate[0])
     rows = functional.leaky_relu(batch_norm(rows, network.aggregate[1]), 0.2)
     return torch.cat([rows.max(dim=1).values, rows.mean(dim=1)], dim=-1), 0.0

@@ -131,3 +131,10 @@ def test_edge_convolutions_keep_full_precision_under_autocast() -> None:
     exact = edge_features(network, clouds())[-1]
     with torch.autocast("cpu", dtype=torch.bfloat16):
         assert torch.equal(edge_features(network, clouds())[-1], exact)
+
+
+def test_neighbours_by_number_of_points_are_the_authors() -> None:
+    assert [DGCNN().num_neighbours(count) for count in (128, 1024, 2048, 4096)] == [20, 20, 40, 40]
+    assert DGCNN(k=7).num_neighbours(4096) == 7
+    _, neighbours = DGCNN().neighbourhoods(clouds(num_points=2048))
+    assert neighbours.shape == (2, 2048, 40)

@@ -72,13 +72,13 @@ class DGCNN(PointNetwork):
 
     Args:
         num_classes: number of logits.
-        k: neighbours per point, itself included; the authors take 20 of 1024 and 40 of 2048 points.
+        k: neighbours per point, itself included; None takes as many as the authors: 20, and 40 from 2048 points on.
         batchnorm_eps: epsilon of every batch normalisation.
     """
 
     feature_size = 2048
 
-    def __init__(self, num_classes: int = 3, *, k: int = 20, batchnorm_eps: float = 1e-5) -> None:
+    def __init__(self, num_classes: int = 3, *, k: int | None = None, batchnorm_eps: float = 1e-5) -> None:
         super().__init__()
         self.k = k
         self.convs = nn.ModuleList([EdgeConv(3, 64), EdgeConv(64, 64), EdgeConv(64, 128), EdgeConv(128, 256)])
@@ -98,11 +98,15 @@ class DGCNN(PointNetwork):
         )
         set_batchnorm(self, eps=batchnorm_eps)
 
+    def num_neighbours(self, num_points: int) -> int:
+        """How many neighbours each point has in a cloud of so many points."""
+        return self.k or (20 if num_points < 2048 else 40)
+
     def neighbourhoods(self, points: Tensor) -> Neighbourhoods:
         """(B, N) order in which near points follow each other, and (B, N, k) neighbours in that order."""
         order = spatial_order(points)
         points = gather_rows(points, order)
-        return order, knn(points, points, self.k, in_order=True)
+        return order, knn(points, points, self.num_neighbours(points.shape[1]), in_order=True)
 
     def edge_features(self, points: Tensor, neighbours: Tensor) -> list[Tensor]:
         """(B, N, 64), (B, N, 64), (B, N, 128) and (B, N, 256) outputs of the edge convolutions.
@@ -118,7 +122,7 @@ class DGCNN(PointNetwork):
         with full_precision(points):
             for conv in self.convs:
                 if outputs:
-                    neighbours = knn(features, features, self.k, in_order=True)
+                    neighbours = knn(features, features, neighbours.shape[2], in_order=True)
                 features = conv(features, neighbours)
                 outputs.append(features)
         return outputs
