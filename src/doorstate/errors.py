@@ -20,6 +20,10 @@ from __future__ import annotations
 class DoorstateError(Exception):
     """Root of the tree; `str(error)` is one line that says what was wrong, where, and what to do."""
 
+    def __str__(self) -> str:
+        # Files name their parts, and files have names: line breaks and terminal escapes among them.
+        return "".join(letter if letter.isprintable() else " " for letter in super().__str__())
+
 
 class CloudError(DoorstateError):
     """One input file or array cannot be used."""

@@ -192,6 +192,14 @@ def test_a_bad_file_gives_one_line_that_starts_with_its_name(
     assert _one_line(caught.value, path)
 
 
+def test_names_in_files_break_no_line_and_reach_no_terminal(tmp_path: Path) -> None:
+    np.savez(tmp_path / "a.npz", **{"one\ntwo\x1b[31m": POINTS, "three": POINTS})
+    with pytest.raises(CloudReadError, match=r"^a.npz: holds one two \[31m, three: name the array"):
+        read_cloud(tmp_path / "a.npz")
+    with pytest.raises(CloudReadError, match=r"^new line.pcd: cannot be read"):
+        read_cloud(tmp_path / "new\nline.pcd")
+
+
 def test_a_missing_file_a_folder_and_a_locked_file(tmp_path: Path) -> None:
     (tmp_path / "folder.pcd").mkdir()
     locked = _write(tmp_path, "locked.pcd", b"VERSION")
