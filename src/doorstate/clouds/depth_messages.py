@@ -66,7 +66,7 @@ def pixels_from_compressed_depth(image_format: str, data: MessageBytes) -> NDArr
     if DEPTH_ENCODINGS[_encoding(image_format)] == "u2":
         return stored
     _, quant_a, quant_b = _PARAMETERS.unpack_from(content)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         depth_m = quant_a / (stored.astype(np.float32) - np.float32(quant_b))
     return np.where(stored > 0, depth_m, np.float32(np.nan)).astype(np.float32)
 
