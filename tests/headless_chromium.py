@@ -86,8 +86,11 @@ class Browser:
         os.close(self._out)
 
     def open(self, address: str) -> None:
-        """Go to a page, without waiting for more than its beginning."""
+        """Go to a page and wait until its scripts have run once."""
         self.call("Page.navigate", url=address)
+        self.wait_until(
+            f"location.href.startsWith({json.dumps(address)}) && document.readyState === 'complete'"
+        )
 
     def evaluate(self, script: str) -> Any:
         """Value of an expression in the page; promises are waited for."""

@@ -23,7 +23,8 @@ def cloud() -> Points:
     sheet = np.random.default_rng(0).uniform(-1, 1, (3, 400, 3))
     for axis in range(3):
         sheet[axis, :, axis] = 1
-    return prepare_cloud(sheet.reshape(-1, 3).astype(np.float32) + [2, 0, 0], COUNT).points
+    sheet[..., 0] += 2
+    return prepare_cloud(sheet.reshape(-1, 3).astype(np.float32), COUNT).points
 
 
 def network_of(name: str, **options: object) -> PointNetwork:
@@ -46,7 +47,9 @@ def features(network: PointNetwork, points: torch.Tensor) -> torch.Tensor:
 def test_of_pointnet_they_are_the_rows_with_the_maximum(cloud: Points) -> None:
     network = network_of("pointnet")
     points = torch.from_numpy(normalize(cloud))
-    alone = torch.stack([features(network, points[k : k + 1]) for k in range(COUNT)])  # T-Nets are the identity
+    alone = torch.stack(
+        [features(network, points[k : k + 1]) for k in range(COUNT)]
+    )  # T-Nets are the identity
     winners = alone.argmax(dim=0)[alone.amax(dim=0) > 0]
     assert len(winners) > 100
     assert counts_of(network, cloud).tolist() == torch.bincount(winners, minlength=COUNT).tolist()

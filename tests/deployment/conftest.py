@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the tests of the view show: one door in three states, one behind glass, and a file that is broken."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+from doorstate.deployment.predictor import Predictor
+from doorstate.deployment.sightings import Sighting
+from doorstate.deployment.view import look
+from doorstate.errors import CloudReadError
+from doorstate.networks import create_network
+from doorstate.simulation.generate import Frame, draw_pose, find_preset, replay
+from doorstate.training.weights import WeightsCard
+from doorstate.types import STATES
+
+POINTS = 300
+Entry = dict[str, Any]
+
+
+@pytest.fixture(scope="module")
+def viewer() -> Predictor:
+    """An untrained PointNet: quick, and any answer will do."""
+    torch.manual_seed(0)
+    card = WeightsCard(network="pointnet", num_points=POINTS)
+    return Predictor(create_network("pointnet"), card, POINTS)
+
+
+@pytest.fixture(scope="module")
+def frames() -> list[Frame]:
+    """A closed, a semi-open and an open door from one place."""
+    return [replay(row) for row in draw_pose(find_preset("ogurob"), 3, 700)]
+
+
+@pytest.fixture(scope="module")
+def sightings(frames: list[Frame]) -> list[Sighting]:
+    """Two with all that can be known, one from a file, one behind glass, one that could not be read."""
+    glass = frames[0].points.copy()
+    glass[:, 200:440] = np.nan
+    known = [
+        Sighting(f"{state} door", frame.points, frame.cut.part.reshape(-1), state)
+        for state, frame in zip(STATES[:2], frames[:2], strict=True)
+    ]
+    return [
+        *known,
+        Sighting("open/file.pcd", frames[2].points),
+        Sighting("glass.png", glass),
+        Sighting("broken.pcd", CloudReadError("broken.pcd: is no PCD file")),
+    ]
+
+
+@pytest.fixture(scope="module")
+def entries(viewer: Predictor, sightings: list[Sighting]) -> list[Entry]:
+    return [look(viewer, sighting) for sighting in sightings]
