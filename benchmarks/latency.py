@@ -3,9 +3,11 @@
 
 from __future__ import annotations
 
+import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 from unittest.mock import patch
@@ -17,6 +19,8 @@ from benchmarks.store import Group
 from benchmarks.tables import milliseconds
 from doorstate.clouds import preparation
 from doorstate.deployment import predictor
+from doorstate.deployment.onnx_export import LabelledClouds, export_onnx
+from doorstate.deployment.onnx_network import OnnxNetwork
 from doorstate.evaluation.table import Table
 from doorstate.jobs import Progress
 from doorstate.networks import create_network
@@ -30,7 +34,7 @@ _NOTE = (
     "Milliseconds of one `Predictor` call, median (90th percentile), on a simulated 640 × 480 cloud in memory; the "
     "weights are untrained, which changes no time. *Clean* drops unmeasured points and checks the rest, *sample* puts "
     "them in farthest-point order, *network* centres them and computes the probabilities; it includes the "
-    "gate on missing data."
+    "gate on missing data. *onnxruntime* is the same network as `doorstate export` writes it."
 )
 
 
@@ -45,31 +49,27 @@ def measure(
     keep_freed_memory()  # as `doorstate predict` does
     raw, rows = raw_cloud(), []
     settings = [(count, points) for count in threads for points in numbers_of_points]
-    for done, (count, points) in enumerate(settings):
-        progress(done, len(settings))
-        predictors = {
-            name: predictor.Predictor(
-                create_network(name), WeightsCard(network=name, num_points=points), points
-            )
-            for name in networks
-        }
-        with use_threads(count):
-            runs = {}
-            for name, predict in predictors.items():
-                predict(raw)
-                runs[name] = [_stages(predict, raw) for _ in range(repeats)]
-        for name in networks:
-            stages = {stage: [run[stage] for run in runs[name]] for stage in STAGES}
-            rows.append({"network": name, "points": points, "threads": count} | {"stages": _summary(stages)})
+    with tempfile.TemporaryDirectory() as folder:
+        for done, (count, points) in enumerate(settings):
+            progress(done, len(settings))
+            for name in networks:
+                for runtime, predict in _predictors(name, points, count, raw, Path(folder)).items():
+                    with use_threads(count):
+                        predict(raw)
+                        runs = [_stages(predict, raw) for _ in range(repeats)]
+                    stages = {stage: [run[stage] for run in runs] for stage in STAGES}
+                    setting = {"network": name, "runtime": runtime, "points": points, "threads": count}
+                    rows.append(setting | {"stages": _summary(stages)})
     progress(len(settings), len(settings))
     return rows
 
 
 def latency_table(rows: Sequence[Group]) -> Table:
-    """One row per network, number of points and threads."""
+    """One row per network, runtime, number of points and threads."""
     cells = [
         (
             row["network"],
+            row["runtime"],
             str(row["points"]),
             str(row["threads"]),
             *(
@@ -80,8 +80,26 @@ def latency_table(rows: Sequence[Group]) -> Table:
         for row in rows
     ]
     return Table(
-        "From a raw cloud to a state", ("network", "points", "threads", *STAGES), tuple(cells), _NOTE, 1
+        "From a raw cloud to a state",
+        ("network", "runtime", "points", "threads", *STAGES),
+        tuple(cells),
+        _NOTE,
+        2,
     )
+
+
+def _predictors(
+    name: str, points: int, threads: int, raw: Points, folder: Path
+) -> dict[str, predictor.Predictor]:
+    network, card = create_network(name), WeightsCard(network=name, num_points=points)
+    path = folder / f"{name}-{points}.onnx"
+    if not path.is_file():
+        cloud = preparation.prepare_cloud(raw, points, thin=True).points[None]
+        export_onnx(path, network, card, LabelledClouds(cloud, np.zeros(1, dtype=np.int64)))
+    return {
+        "torch": predictor.Predictor(network, card, points),
+        "onnxruntime": predictor.Predictor(OnnxNetwork(path, threads), card, points),
+    }
 
 
 def _summary(stages: dict[str, list[float]]) -> dict[str, dict[str, Any]]:

@@ -148,11 +148,11 @@ def test_only_what_is_missing_or_failed_is_measured_again(
 
 def test_latency_is_the_sum_of_its_stages(tmp_path: Path) -> None:
     few = ("--points", "128", "--threads", "1", "--repeats", "1")
-    assert run("latency", "--networks", "pointnet,point2sequence", "--out", tmp_path, *few)[0] == 0
+    assert run("latency", "--networks", "pointnet", "--out", tmp_path, *few)[0] == 0
     _, rows, markdown = stored(tmp_path, "latency")
-    assert [(row["network"], row["points"], row["threads"]) for row in rows] == [
-        ("pointnet", 128, 1),
-        ("point2sequence", 128, 1),
+    assert [(row["network"], row["runtime"], row["points"], row["threads"]) for row in rows] == [
+        ("pointnet", "torch", 128, 1),
+        ("pointnet", "onnxruntime", 128, 1),
     ]
     for row in rows:
         stages = {name: stage["median_ms"] for name, stage in row["stages"].items()}
@@ -160,7 +160,7 @@ def test_latency_is_the_sum_of_its_stages(tmp_path: Path) -> None:
         assert set(stages) == {"clean", "sample", "network"}
         assert all(spent > 0 for spent in stages.values())
         assert sum(stages.values()) == pytest.approx(total)
-        assert f"| {row['network']} | 128 | 1 |" in markdown
+        assert f"| {row['network']} | {row['runtime']} | 128 | 1 |" in markdown
 
 
 def test_profile_has_a_row_per_group_of_operators(tmp_path: Path) -> None:

@@ -35,6 +35,7 @@ COMMANDS = (
     "predict",
     "view",
     "serve",
+    "export",
     "info",
 )
 

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import torch
@@ -52,8 +52,16 @@ class Comparison:
 
     largest: float  # difference in a probability
     allowed: float
-    other_states: int  # clouds whose likeliest state is another
     clouds: int
+    right: int  # states that the file tells as they are
+    right_in_torch: int
+
+
+class LabelledClouds(NamedTuple):
+    """What to compare on."""
+
+    points: Points  # (M, n, 3) metres in farthest-point order
+    labels: NDArray[np.int64]  # (M,)
 
 
 class _Graph(nn.Module):
@@ -75,7 +83,7 @@ def export_onnx(
     path: Path,
     network: PointNetwork,
     card: WeightsCard,
-    clouds: Points,
+    clouds: LabelledClouds,
     *,
     opset: int = OPSET,
     int8: bool = False,
@@ -87,7 +95,7 @@ def export_onnx(
         path: of the file, which appears only if the comparison is passed.
         network: classifier, in evaluation mode.
         card: of its weights.
-        clouds: (M, n, 3) metres in farthest-point order to compare on; the file will take n points.
+        clouds: to compare on; the file will take as many points as they have.
         opset: version of ONNX's operators.
         int8: keep the matrices of linear layers as 8-bit integers; then no difference is too large.
         progress: of the comparison.
@@ -104,15 +112,16 @@ def export_onnx(
         raise MissingExtraError(
             f'export needs the package {error.name}: pip install "doorstate[onnx]"'
         ) from error
+    num_points = clouds.points.shape[1]
     with atomic_path(path) as temporary:
         with _quiet():
             try:
-                model = _model(network, card, clouds.shape[1], opset)
+                model = _model(network, card, num_points, opset)
                 onnx.save(model, temporary)
                 if int8:
                     _quantize(temporary)
                     model = onnx.load(temporary)
-                metadata = {CARD: card.model_copy(update={"num_points": clouds.shape[1]}).model_dump_json()}
+                metadata = {CARD: card.model_copy(update={"num_points": num_points}).model_dump_json()}
                 onnx.helper.set_model_props(model, _METADATA | metadata)
                 model.producer_name, model.producer_version = "doorstate", __version__
                 onnx.checker.check_model(model, full_check=True)
@@ -132,7 +141,11 @@ def export_onnx(
 
 
 def compare_with_torch(
-    path: Path, network: PointNetwork, card: WeightsCard, clouds: Points, progress: Progress = no_progress
+    path: Path,
+    network: PointNetwork,
+    card: WeightsCard,
+    clouds: LabelledClouds,
+    progress: Progress = no_progress,
 ) -> Comparison:
     """Ask the file and torch about the same clouds, alone and in pairs.
 
@@ -144,42 +157,48 @@ def compare_with_torch(
         path: a file of `export_onnx`.
         network: what it was made of.
         card: of its weights.
-        clouds: (M, n, 3) metres in farthest-point order.
-        progress: called after every cloud or pair.
+        clouds: with as many points as the file takes.
+        progress: called after every three clouds.
     """
+    points, labels = clouds
     exported, original = OnnxNetwork(path), TorchNetwork(network, card.temperature)
     answers: list[NDArray[np.float32]] = []
     expected: list[NDArray[np.float32]] = []
-    progress(0, len(clouds))
-    for alone in range(0, len(clouds), 3):
-        for some in (clouds[alone : alone + 1], clouds[alone + 1 : alone + 3]):
+    progress(0, len(points))
+    for alone in range(0, len(points), 3):
+        for some in (points[alone : alone + 1], points[alone + 1 : alone + 3]):
             if len(some):
                 answers.append(exported.probabilities(some))
                 expected.append(original.probabilities(some))
-        progress(min(alone + 3, len(clouds)), len(clouds))
+        progress(min(alone + 3, len(points)), len(points))
     found, said = np.concatenate(answers), np.concatenate(expected)
     largest, allowed = float(np.abs(found - said).max()), TOLERANCE
     if largest > TOLERANCE:
-        allowed = max(TOLERANCE, 2 * float(np.abs(said - _in_float64(network, card, clouds)).max()))
-    other_states = int((found.argmax(1) != said.argmax(1)).sum())
-    return Comparison(largest, allowed, other_states, len(clouds))
+        allowed = max(TOLERANCE, 2 * float(np.abs(said - _in_float64(network, card, points)).max()))
+    right, right_in_torch = (int((each.argmax(1) == labels).sum()) for each in (found, said))
+    return Comparison(largest, allowed, len(points), right, right_in_torch)
 
 
-def comparison_clouds(count: int, num_points: int, progress: Progress = no_progress) -> Points:
-    """(count, num_points, 3) metres in farthest-point order: simulated doors in all three states.
+def comparison_clouds(count: int, num_points: int, progress: Progress = no_progress) -> LabelledClouds:
+    """Simulated doors in all three states, drawn for no training.
 
     Raises:
         ConfigError: more points than a simulated cloud has.
     """
+    rows = [
+        row
+        for pose in pose_indices(max(3, -(-count // len(STATES))))
+        for row in draw_pose(PRESETS["ogurob"], _SEED, pose)
+    ][:count]
     clouds: list[Points] = []
-    for pose in pose_indices(-(-count // len(STATES)) + 2)[1:]:  # the first position is the ring's end
-        for row in draw_pose(PRESETS["ogurob"], _SEED, pose)[: count - len(clouds)]:
-            clouds.append(prepare_cloud(replay(row).points, num_points, thin=True).points)
-            progress(len(clouds), count)
+    for row in rows:
+        clouds.append(prepare_cloud(replay(row).points, num_points, thin=True).points)
+        progress(len(clouds), count)
     fewest = min(map(len, clouds))
     if fewest < num_points:
         raise ConfigError(f"--points {num_points}: a simulated cloud has only {fewest} distinct points")
-    return np.stack(clouds)
+    labels = np.array([STATES.index(row.state) for row in rows], dtype=np.int64)
+    return LabelledClouds(np.stack(clouds), labels)
 
 
 def _model(network: PointNetwork, card: WeightsCard, num_points: int, opset: int) -> ModelProto:

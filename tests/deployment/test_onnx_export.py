@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Every network as ONNX: a checked file that onnxruntime answers from as torch does, or no file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import onnx
+import pytest
+import torch
+
+from doorstate.dataset.store import PreparedDataset
+from doorstate.deployment import onnx_export
+from doorstate.deployment.onnx_export import TOLERANCE, LabelledClouds, export_onnx
+from doorstate.deployment.onnx_network import OnnxNetwork
+from doorstate.deployment.torch_network import TorchNetwork
+from doorstate.errors import ExportError
+from doorstate.networks import create_network, list_networks
+from doorstate.networks.base import PointNetwork
+from doorstate.networks.layers import set_batchnorm
+from doorstate.training.card import WeightsCard
+
+SLOW = {"pointcnn"}
+
+
+def card_of(name: str) -> WeightsCard:
+    return WeightsCard(network=name, num_points=4096, temperature=0.1, trained_on="nothing")
+
+
+@pytest.fixture(scope="module")
+def clouds(small_dataset: PreparedDataset) -> LabelledClouds:
+    return LabelledClouds(np.array(small_dataset.clouds[:7]), small_dataset.labels[:7])
+
+
+def used_to(name: str, clouds: LabelledClouds) -> PointNetwork:
+    """An untrained network whose batch normalisation has seen doors, so that its answers differ."""
+    torch.manual_seed(0)
+    network = create_network(name).train()
+    set_batchnorm(network, momentum=1.0)
+    with torch.no_grad():
+        network(torch.from_numpy(onnx_export.normalize(clouds.points)))
+    return network.eval()
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name in SLOW)) for name in list_networks()]
+)
+def test_the_file_answers_as_torch_does(name: str, clouds: LabelledClouds, tmp_path: Path) -> None:
+    path, network = tmp_path / "network.onnx", used_to(name, clouds)
+    comparison = export_onnx(path, network, card_of(name), clouds)
+    assert comparison.largest <= TOLERANCE == comparison.allowed
+    assert comparison.right == comparison.right_in_torch
+    exported = OnnxNetwork(path)
+    expected = TorchNetwork(network, 0.1).probabilities(clouds.points)
+    assert np.ptp(expected, axis=0).max() > 0.1, "answers that are all alike compare nothing"
+    for batch in (clouds.points[:1], clouds.points[1:6]):
+        found = exported.probabilities(batch)
+        np.testing.assert_allclose(found.sum(1), 1, atol=1e-5)
+    np.testing.assert_allclose(exported.probabilities(clouds.points), expected, atol=TOLERANCE)
+
+    model = onnx.load(path)
+    onnx.checker.check_model(model, full_check=True)
+    assert model.opset_import[0].version == onnx_export.OPSET
+    (given,), (answered,) = model.graph.input, model.graph.output
+    assert (given.name, answered.name) == ("points", "probabilities")
+    batch, *fixed = given.type.tensor_type.shape.dim
+    assert batch.dim_param
+    assert [size.dim_value for size in fixed] == [160, 3]
+    metadata = {entry.key: entry.value for entry in model.metadata_props}
+    assert metadata["labels"] == "closed,semi_open,open"
+    assert metadata["units"] == "metres"
+    assert {"frame", "preparation"} < set(metadata)
+    assert exported.card == card_of(name).model_copy(update={"num_points": 160})
+
+
+def test_int8_is_a_quarter_of_the_size_and_another_answer(clouds: LabelledClouds, tmp_path: Path) -> None:
+    network = used_to("pointnet", clouds)
+    comparison = export_onnx(tmp_path / "small.onnx", network, card_of("pointnet"), clouds, int8=True)
+    assert comparison.largest > 0, "it is reported"
+    parameters = sum(parameter.numel() for parameter in network.parameters())
+    assert (tmp_path / "small.onnx").stat().st_size < 1.1 * parameters
+    assert OnnxNetwork(tmp_path / "small.onnx").card.num_points == 160
+    assert any(node.op_type == "MatMulInteger" for node in onnx.load(tmp_path / "small.onnx").graph.node)
+
+
+def test_a_file_that_would_answer_otherwise_is_not_written(
+    clouds: LabelledClouds, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(onnx_export, "SCALE_M", 2.0)
+    with pytest.raises(
+        ExportError, match=r"net\.onnx not written: its probabilities differ from torch's by 0\."
+    ):
+        export_onnx(tmp_path / "net.onnx", used_to("pointnet", clouds), card_of("pointnet"), clouds)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_opset_that_does_not_exist_is_one_line(clouds: LabelledClouds, tmp_path: Path) -> None:
+    with pytest.raises(ExportError, match=r"pointnet cannot be exported with opset 99: .*") as caught:
+        export_onnx(tmp_path / "net.onnx", used_to("pointnet", clouds), card_of("pointnet"), clouds, opset=99)
+    assert "\n" not in str(caught.value)
+    assert list(tmp_path.iterdir()) == []
