@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from doorstate.clouds.preparation import NUM_POINTS, prepare_cloud
 from doorstate.deployment.answers import described
-from doorstate.deployment.critical import critical_points
 from doorstate.deployment.onnx_network import OnnxNetwork
 from doorstate.deployment.predictor import Predictor
 from doorstate.deployment.rule_predictor import RulePredictor
@@ -19,7 +19,7 @@ from doorstate.errors import DoorstateError
 from doorstate.evaluation.found_shapes import encode_shapes
 from doorstate.evaluation.pages import encode_bytes, encode_cloud, render_page
 from doorstate.evaluation.views import STATE_COLORS
-from doorstate.types import STATES
+from doorstate.types import STATES, Points
 
 Entry = dict[str, Any]
 """One cloud as the page takes it; it holds an `error`, or an `answer` and a `cloud`."""
@@ -45,13 +45,7 @@ def look(predictor: Predictor | RulePredictor, sighting: Sighting) -> Entry:
             prepared = prepare_cloud(sighting.cloud, NUM_POINTS, thin=True)
     except DoorstateError as error:
         return entry | {"error": str(error)}
-    channels = None
-    if (
-        isinstance(predictor, Predictor)
-        and not isinstance(predictor.network, OnnxNetwork)
-        and answer.state is not None
-    ):
-        channels = critical_points(predictor.network, prepared.points)
+    channels = None if answer.state is None else _channels(predictor, prepared.points)
     parts = None if sighting.parts is None else sighting.parts[prepared.indices[:NUM_POINTS]]
     if channels is not None:
         counted = np.rint(channels[:NUM_POINTS] * _CHANNEL_PARTS).astype("<u2")
@@ -61,6 +55,16 @@ def look(predictor: Predictor | RulePredictor, sighting: Sighting) -> Entry:
         "cloud": encode_cloud(prepared.points[:NUM_POINTS], parts),
         "shapes": encode_shapes(answer.found),
     }
+
+
+def _channels(predictor: Predictor | RulePredictor, points: Points) -> NDArray[np.float32] | None:
+    if isinstance(predictor, RulePredictor) or isinstance(predictor.network, OnnxNetwork):
+        return None
+    from doorstate.deployment.critical import (
+        critical_points,
+    )  # with torch, which an exported network does without
+
+    return critical_points(predictor.network, points)
 
 
 def render_view(predictor: Predictor | RulePredictor, entries: Sequence[Entry], *, live: bool = False) -> str:
