@@ -60,9 +60,8 @@ def look(predictor: Predictor | RulePredictor, sighting: Sighting) -> Entry:
 def _channels(predictor: Predictor | RulePredictor, points: Points) -> NDArray[np.float32] | None:
     if isinstance(predictor, RulePredictor) or isinstance(predictor.network, OnnxNetwork):
         return None
-    from doorstate.deployment.critical import (
-        critical_points,
-    )  # with torch, which an exported network does without
+    # With torch, which an exported network does without.
+    from doorstate.deployment.critical import critical_points
 
     return critical_points(predictor.network, points)
 
