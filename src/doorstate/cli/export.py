@@ -58,6 +58,6 @@ def export(
     )
     if found.allowed > TOLERANCE and not int8:
         stdout.print(
-            f"more than {TOLERANCE:.0e} is rounding here: torch is {found.allowed / 2:.1e} from itself in float64",
+            f"more than {TOLERANCE:.0e} is rounding here, which moves torch's own answers by {found.allowed / 2:.1e}",
             soft_wrap=True,
         )
