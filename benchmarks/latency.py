@@ -92,14 +92,15 @@ def _predictors(
     name: str, points: int, threads: int, raw: Points, folder: Path
 ) -> dict[str, predictor.Predictor]:
     network, card = create_network(name), WeightsCard(network=name, num_points=points)
-    path = folder / f"{name}-{points}.onnx"
-    if not path.is_file():
-        cloud = preparation.prepare_cloud(raw, points, thin=True).points[None]
-        export_onnx(path, network, card, LabelledClouds(cloud, np.zeros(1, dtype=np.int64)))
-    return {
-        "torch": predictor.Predictor(network, card, points),
-        "onnxruntime": predictor.Predictor(OnnxNetwork(path, threads), card, points),
-    }
+    predictors = {"torch": predictor.Predictor(network, card, points)}
+    for runtime, int8 in (("onnxruntime", False), ("onnxruntime int8", True)):
+        path = folder / f"{name}-{points}-{runtime}.onnx"
+        if not path.is_file():
+            cloud = preparation.prepare_cloud(raw, points, thin=True).points[None]
+            labels = np.zeros(1, dtype=np.int64)
+            export_onnx(path, network, card, LabelledClouds(cloud, labels), int8=int8)
+        predictors[runtime] = predictor.Predictor(OnnxNetwork(path, threads), card, points)
+    return predictors
 
 
 def _summary(stages: dict[str, list[float]]) -> dict[str, dict[str, Any]]:

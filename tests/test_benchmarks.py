@@ -153,6 +153,7 @@ def test_latency_is_the_sum_of_its_stages(tmp_path: Path) -> None:
     assert [(row["network"], row["runtime"], row["points"], row["threads"]) for row in rows] == [
         ("pointnet", "torch", 128, 1),
         ("pointnet", "onnxruntime", 128, 1),
+        ("pointnet", "onnxruntime int8", 128, 1),
     ]
     for row in rows:
         stages = {name: stage["median_ms"] for name, stage in row["stages"].items()}

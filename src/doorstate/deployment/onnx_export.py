@@ -37,7 +37,7 @@ TOLERANCE = 1e-4  # of a probability
 _SEED = 1_000_003  # of clouds that no weights were trained on
 _ANY_SIZE = 2**30  # of a constant
 _JITTERS = 3
-_LAST_DIGIT = np.float32([-(2.0**-23), 0.0, 2.0**-23])  # of a float32, relative
+_LAST_DIGIT = np.array([-(2.0**-23), 0.0, 2.0**-23], dtype=np.float32)  # of a float32, relative
 _METADATA = {
     "frame": "x forward, y left, z up, origin at the camera, gravity-aligned (ROS REP 103)",
     "units": "metres",
