@@ -31,10 +31,10 @@ def test_every_network_has_an_authors_recipe() -> None:
 
 
 @pytest.mark.parametrize("network", list_networks())
-def test_the_common_recipe_differs_in_length_alone_and_ends_on_everything(network: str) -> None:
+def test_the_common_recipe_differs_in_length_and_batch_and_ends_on_everything(network: str) -> None:
     recipe = find_recipe("common", network)
-    same = {"epochs": COMMON.epochs, "coarse_to_fine": COMMON.coarse_to_fine}
-    assert recipe.model_copy(update=same) == COMMON
+    own = ("epochs", "coarse_to_fine", "batch_size", "learning_rate")
+    assert recipe.model_copy(update={name: getattr(COMMON, name) for name in own}) == COMMON
     assert resolution_of_epoch(recipe, recipe.epochs - 1, 4096) == (4096, 1.0)
     assert find_recipe("common", "mvcnn") == COMMON
 
