@@ -30,7 +30,7 @@ IntrinsicsFile = Annotated[
 Focal = Annotated[
     float | None, typer.Option(help="Focal length or centre in pixels, in place of --intrinsics.")
 ]
-# Who answers, and recordings to answer: the same options for `predict` and `view`.
+# Who answers, and recordings to answer: the same options for `predict`, `view` and `serve`.
 Network = Annotated[str, typer.Option(help="Network whose packaged weights to use.")]
 Weights = Annotated[Path | None, typer.Option(help="A weights file of your own, in place of --network.")]
 RuleName = Annotated[

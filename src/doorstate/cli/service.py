@@ -6,11 +6,11 @@ from __future__ import annotations
 import math
 import signal
 import socket
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from doorstate.cli.options import Network, PointCount, Weights
 from doorstate.errors import ConfigError, MissingExtraError
 
 
@@ -19,13 +19,9 @@ def serve(
         str, typer.Option(help="Address to listen on; 0.0.0.0 lets other machines in.")
     ] = "127.0.0.1",
     port: Annotated[int, typer.Option(help="0 takes any that is free.", min=0, max=65535)] = 8000,
-    network: Annotated[str, typer.Option(help="Network whose packaged weights to use.")] = "pointnet2",
-    weights: Annotated[
-        Path | None, typer.Option(help="A weights file of your own, in place of --network.")
-    ] = None,
-    points: Annotated[
-        int | None, typer.Option(help="Points to look at; as trained if not given.", min=128)
-    ] = None,
+    network: Network = "pointnet2",
+    weights: Weights = None,
+    points: PointCount = None,
     max_megabytes: Annotated[float, typer.Option(help="Larger files are refused.", min=0.001)] = 64.0,
     timeout_s: Annotated[
         float, typer.Option(help="From the head of a request to its answer; slower ones end.", min=0.1)
