@@ -25,6 +25,10 @@ Points = Annotated[str, typer.Option(help="Points per cloud, separated by commas
 Batch = Annotated[int, typer.Option(help="Clouds of a training step.", min=2)]
 Repeats = Annotated[int, typer.Option(help="Rounds in which everything takes turns.", min=1)]
 Threads = Annotated[int, typer.Option(help="Threads of every measurement.", min=1)]
+Simulated = Annotated[Path, typer.Option("--data", help="A prepared data set, simulated.")]
+Packaged = Annotated[str, typer.Option(help="Whose packaged weights.")]
+TestClouds = Annotated[int, typer.Option("--count", help="Test clouds, drawn at random.", min=1)]
+Fold = Annotated[int, typer.Option(help="Of protocol paper.", min=0, max=4)]
 _ALL_POINTS = "1024,2048,4096"
 
 app = typer.Typer(
@@ -168,10 +172,10 @@ def knn(out: Out, points: Points = _ALL_POINTS, repeats: Repeats = 5, threads: T
 @app.command()
 def thinning(
     out: Out,
-    data: Annotated[Path, typer.Option(help="A prepared data set, simulated.")],
-    network: Annotated[str, typer.Option(help="Whose packaged weights.")] = "pointnet2",
-    count: Annotated[int, typer.Option(help="Test clouds, drawn at random.", min=1)] = 300,
-    fold: Annotated[int, typer.Option(help="Of protocol paper.", min=0, max=4)] = 0,
+    data: Simulated,
+    network: Packaged = "pointnet2",
+    count: TestClouds = 300,
+    fold: Fold = 0,
 ) -> None:
     """Whether sampling some pixels, as a robot does, gives the answers of sampling all, as in training."""
     from benchmarks.thinning import measure, thinning_table
@@ -187,10 +191,10 @@ def thinning(
 @app.command()
 def gate(
     out: Out,
-    data: Annotated[Path, typer.Option(help="A prepared data set, simulated.")],
-    network: Annotated[str, typer.Option(help="Whose packaged weights.")] = "pointnet2",
-    count: Annotated[int, typer.Option(help="Test clouds, drawn at random.", min=1)] = 100,
-    fold: Annotated[int, typer.Option(help="Of protocol paper.", min=0, max=4)] = 0,
+    data: Simulated,
+    network: Packaged = "pointnet2",
+    count: TestClouds = 100,
+    fold: Fold = 0,
 ) -> None:
     """What the gate refuses, and what becomes "open" with and without it, when data go missing."""
     from benchmarks.gate import gate_table, measure
@@ -208,7 +212,7 @@ def service(
     out: Out,
     seconds: Annotated[float, typer.Option(help="Of every number of clients.", min=0.1)] = 60.0,
     clients: Annotated[str, typer.Option(help="Numbers of clients, separated by commas.")] = "1,4,16",
-    network: Annotated[str, typer.Option(help="Whose packaged weights.")] = "pointnet2",
+    network: Packaged = "pointnet2",
     points: Annotated[int | None, typer.Option(help="As trained if not given.", min=128)] = None,
     workers: Annotated[int | None, typer.Option(help="All processors if not given.", min=1)] = None,
 ) -> None:
@@ -266,7 +270,7 @@ def curves(
     network: Annotated[str, typer.Option(help="Which network.")] = "pointnet",
     points: Annotated[int, typer.Option(help="Points per cloud.", min=128)] = 512,
     epochs: Annotated[int, typer.Option(help="Length of both trainings.", min=1)] = 8,
-    fold: Annotated[int, typer.Option(help="Of protocol paper.", min=0, max=4)] = 0,
+    fold: Fold = 0,
     seeds: Annotated[int, typer.Option(help="How many seeds fast is trained from.", min=1)] = 3,
     runs: Annotated[Path, typer.Option(help="Folder of the runs, which are resumable.")] = Path("runs"),
 ) -> None:

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Door clouds to time with: the same ones every time, drawn from one seed or read from a prepared data set."""
+"""Door clouds to measure with: the same ones every time, drawn from one seed or from a prepared data set."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -10,9 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from doorstate.clouds.preparation import normalize, prepare_cloud
-from doorstate.dataset.store import open_dataset
+from doorstate.dataset.splits import draw_splits
+from doorstate.dataset.store import PreparedDataset, open_dataset
 from doorstate.errors import ConfigError
-from doorstate.simulation.generate import PRESETS, draw_pose, pose_indices, replay
+from doorstate.jobs import Progress
+from doorstate.simulation.generate import PRESETS, Frame, draw_pose, pose_indices, replay
+from doorstate.simulation.manifest import unflatten
 from doorstate.types import STATES, Points
 
 _SEED = 0
@@ -66,3 +70,16 @@ def dataset_clouds(folder: Path, count: int, num_points: int) -> Clouds:
         )
     chosen = np.linspace(0, len(dataset) - 1, count).astype(np.int64)
     return Clouds(np.array(dataset.clouds[chosen, :num_points]), dataset.labels[chosen])
+
+
+def tested_frames(
+    dataset: PreparedDataset, count: int, fold: int, progress: Progress
+) -> Iterator[tuple[int, dict[str, str], Frame]]:
+    """Number, row and frame, rendered anew, of samples that a fold of protocol paper tests, drawn at random."""
+    roles = draw_splits(dataset.rows, "paper", 0)[fold]
+    tested = [row for row in dataset.rows if roles[row["sample_id"]] == "test"]
+    chosen = np.random.default_rng(0).permutation(len(tested))[:count]
+    for done, index in enumerate(chosen):
+        progress(done, len(chosen))
+        yield int(index), tested[index], replay(unflatten(tested[index]))
+    progress(len(chosen), len(chosen))

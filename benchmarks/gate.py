@@ -8,8 +8,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.clouds import tested_frames
 from benchmarks.store import Group
-from doorstate.dataset.splits import draw_splits
 from doorstate.dataset.store import PreparedDataset
 from doorstate.deployment.predictor import Predictor
 from doorstate.errors import CloudContentError
@@ -73,17 +73,12 @@ FAULTS: dict[str, Fault] = {
 
 def measure(dataset: PreparedDataset, network: str, count: int, fold: int, progress: Progress) -> list[Group]:
     """Answers of packaged weights, with and without gate, on test clouds of a fold with every fault."""
-    roles = draw_splits(dataset.rows, "paper", 0)[fold]
-    tested = [row for row in dataset.rows if roles[row["sample_id"]] == "test"]
-    chosen = np.random.default_rng(0).permutation(len(tested))[:count]
     predictor = Predictor.load(network)
     careless = Predictor(predictor.network, predictor.card, predictor.points, gate=None)
     rows = []
-    for done, index in enumerate(chosen):
-        progress(done, len(chosen))
-        row, frame = tested[index], replay(unflatten(tested[index]))
+    for number, row, frame in tested_frames(dataset, count, fold, progress):
         for name, fault in FAULTS.items():
-            cloud = fault(row, frame, np.random.default_rng(index))
+            cloud = fault(row, frame, np.random.default_rng(number))
             rows.append(
                 {
                     "sample_id": row["sample_id"],
@@ -93,7 +88,6 @@ def measure(dataset: PreparedDataset, network: str, count: int, fold: int, progr
                     "careless": _told(careless, cloud),
                 }
             )
-    progress(len(chosen), len(chosen))
     return rows
 
 

@@ -7,29 +7,21 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from benchmarks.clouds import tested_frames
 from benchmarks.store import Group
-from doorstate.dataset.splits import draw_splits
 from doorstate.dataset.store import PreparedDataset
 from doorstate.deployment.predictor import Prediction, Predictor
 from doorstate.evaluation.table import Table, number
 from doorstate.jobs import Progress
-from doorstate.simulation.generate import replay
-from doorstate.simulation.manifest import unflatten
 
 
 def measure(dataset: PreparedDataset, network: str, count: int, fold: int, progress: Progress) -> list[Group]:
     """Answers of packaged weights on test clouds of a fold, rendered anew, with both samplings."""
-    roles = draw_splits(dataset.rows, "paper", 0)[fold]
-    tested = [row for row in dataset.rows if roles[row["sample_id"]] == "test"]
-    chosen = np.random.default_rng(0).permutation(len(tested))[:count]
     samplings = {"some": Predictor.load(network), "all": Predictor.load(network, thin=False)}
     rows = []
-    for done, index in enumerate(chosen):
-        progress(done, len(chosen))
-        raw = replay(unflatten(tested[index])).points
-        answers = {name: predict(raw) for name, predict in samplings.items()}
-        rows.append({"sample_id": tested[index]["sample_id"]} | {k: _told(v) for k, v in answers.items()})
-    progress(len(chosen), len(chosen))
+    for _, row, frame in tested_frames(dataset, count, fold, progress):
+        answers = {name: predict(frame.points) for name, predict in samplings.items()}
+        rows.append({"sample_id": row["sample_id"]} | {k: _told(v) for k, v in answers.items()})
     return rows
 
 

@@ -15,8 +15,10 @@ from hypothesis import settings
 from doorstate.cli import main
 from doorstate.dataset.prepare import prepare_dataset
 from doorstate.dataset.store import PreparedDataset
+from doorstate.networks import create_network
 from doorstate.simulation.generate import PRESETS
 from doorstate.simulation.run import SimulationSettings, simulate_dataset
+from doorstate.training.weights import WeightsCard, save_weights
 
 SMALL_POINTS = 160
 Run = Callable[..., tuple[int, str, str]]
@@ -47,6 +49,14 @@ def small_dataset(simulated_folder: Path, tmp_path_factory: pytest.TempPathFacto
     """The same samples with 160 points each."""
     folder = tmp_path_factory.mktemp("prepared") / "small"
     return prepare_dataset(simulated_folder, folder, SMALL_POINTS, workers=1).dataset
+
+
+@pytest.fixture(scope="session")
+def weights(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An untrained PointNet: quick, and any answer will do."""
+    path = tmp_path_factory.mktemp("weights") / "pointnet.safetensors"
+    save_weights(path, create_network("pointnet"), WeightsCard(network="pointnet", num_points=256))
+    return path
 
 
 @pytest.fixture

@@ -19,9 +19,8 @@ from PIL import Image
 import doorstate
 from doorstate.clouds.pcd import write_pcd
 from doorstate.dataset.store import PreparedDataset
-from doorstate.networks import create_network, list_networks
+from doorstate.networks import list_networks
 from doorstate.rules import list_rules
-from doorstate.training.weights import WeightsCard, save_weights
 
 Run = Callable[..., tuple[int, str, str]]
 REAL = Path(__file__).resolve().parents[1].parent / "shared" / "real"
@@ -38,14 +37,6 @@ COMMANDS = (
     "export",
     "info",
 )
-
-
-@pytest.fixture(scope="session")
-def weights(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """An untrained PointNet: quick, and any answer will do."""
-    path = tmp_path_factory.mktemp("weights") / "pointnet.safetensors"
-    save_weights(path, create_network("pointnet"), WeightsCard(network="pointnet", num_points=256))
-    return path
 
 
 @pytest.fixture

@@ -20,19 +20,9 @@ import numpy as np
 import pytest
 
 from doorstate.cli import viewing
-from doorstate.networks import create_network
-from doorstate.training.weights import WeightsCard, save_weights
 
 Run = Callable[..., tuple[int, str, str]]
 CLOUD = np.random.default_rng(0).uniform((1, -1, -1), (3, 1, 1), (20, 25, 3)).astype(np.float32)
-
-
-@pytest.fixture(scope="module")
-def weights(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """An untrained PointNet: quick, and any answer will do."""
-    path = tmp_path_factory.mktemp("weights") / "pointnet.safetensors"
-    save_weights(path, create_network("pointnet"), WeightsCard(network="pointnet", num_points=128))
-    return path
 
 
 @pytest.fixture

@@ -23,6 +23,7 @@ from doorstate.cli.options import (
     Topic,
     Units,
     Weights,
+    files_or_bag,
     read_options,
 )
 from doorstate.cli.predictions import load_predictor, table_cells
@@ -72,11 +73,8 @@ def predict(
     """
     from doorstate.cli.bags import predict_bag
     from doorstate.clouds.io import find_clouds
-    from doorstate.console import err
 
-    if bool(files) == (bag is not None):
-        err.print("doorstate: give files, or a recording by --bag: one of the two")
-        raise typer.Exit(2)
+    files_or_bag(files, bag)
     if bag is None and (topic, camera_info_topic, every, out) != (None, None, 1, None):
         raise ConfigError("--topic, --camera-info-topic, --every and --out are for --bag")
     if out is not None and as_json:

@@ -53,6 +53,15 @@ Changes = Annotated[
 ]
 
 
+def files_or_bag(files: list[Path] | None, bag: Path | None) -> None:
+    """End with the exit code of wrong usage unless there are files or a recording, and not both."""
+    from doorstate.console import err
+
+    if bool(files) == (bag is not None):
+        err.print("doorstate: give files, or a recording by --bag: one of the two")
+        raise typer.Exit(2)
+
+
 def read_options(
     frame: str,
     roll: int,

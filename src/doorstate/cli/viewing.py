@@ -29,6 +29,7 @@ from doorstate.cli.options import (
     Topic,
     Units,
     Weights,
+    files_or_bag,
     read_options,
 )
 from doorstate.cli.predictions import load_predictor
@@ -94,11 +95,7 @@ def view(
       doorstate view --live --bag run.bag --topic /camera/depth/points --frame optical
       doorstate view --live incoming/ --port 8080 --no-open
     """
-    from doorstate.console import err
-
-    if bool(files) == (bag is not None):
-        err.print("doorstate: give files, or a recording by --bag: one of the two")
-        raise typer.Exit(2)
+    files_or_bag(files, bag)
     if bag is None and (topic, camera_info_topic) != (None, None):
         raise ConfigError("--topic and --camera-info-topic are for --bag")
     if not live and (rate, port) != (None, 0):

@@ -27,10 +27,7 @@ def load_joined(
     """
     parts = [load_results(folder, dataset_folder, folds) for folder in comparison_folders]
     fewest = min(part.comparison.folds for part in parts)
-    first, *others = [
-        load_results(folder, dataset_folder, fewest) if part.comparison.folds > fewest else part
-        for folder, part in zip(comparison_folders, parts, strict=True)
-    ]
+    first, *others = [_first_folds(part, fewest) for part in parts]
     for folder, other in zip(comparison_folders[1:], others, strict=True):
         for name in ("protocol", "num_points"):
             if getattr(other.comparison, name) != getattr(first.comparison, name):
@@ -50,3 +47,10 @@ def load_joined(
         rules=tuple(rule for part in every for rule in part.comparison.rules),
     )
     return replace(first, comparison=comparison, runs=tuple(run for part in every for run in part.runs))
+
+
+def _first_folds(results: ComparisonResults, folds: int) -> ComparisonResults:
+    comparison = replace(results.comparison, folds=folds)
+    return replace(
+        results, comparison=comparison, runs=tuple(run for run in results.runs if run.fold < folds)
+    )

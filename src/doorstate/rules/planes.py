@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,11 +24,6 @@ class Plane:
         """(N,) signed distances of (N, 3) points; positive behind the plane as the camera sees it."""
         distances: Floats = points @ self.normal - self.offset_m
         return distances
-
-    @property
-    def heading_rad(self) -> float:
-        """Direction of the normal in plan view."""
-        return math.atan2(self.normal[1], self.normal[0])
 
 
 def upright_plane(points: Floats, threshold_m: float, *, seed: int = 0) -> tuple[Plane, Flags] | None:

@@ -87,16 +87,11 @@ def nearby(cloud: Points, farthest_m: float) -> tuple[Floats, float]:
 
     The share is taken before the range; of a flat cloud it is 1.
     """
-    coarse = every_other(cloud)
+    coarse = cloud[::2, ::2] if cloud.ndim == 3 else cloud
     points = measured(coarse)
     pixels = coarse.size / 3 if coarse.ndim == 3 else 0
     share = len(points) / pixels if pixels else 1.0
     return points[np.abs(points).max(axis=1) < farthest_m], share
-
-
-def every_other(cloud: Points) -> Points:
-    """Every other row and column of an organized cloud, four times quicker; a flat one as it is."""
-    return cloud[::2, ::2] if cloud.ndim == 3 else cloud
 
 
 def off_floor(points: Floats, margin_m: float) -> Flags:
