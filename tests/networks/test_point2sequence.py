@@ -97,12 +97,12 @@ def test_areas_are_nested_and_ordered(network: Point2Sequence) -> None:
 
 def test_sequence_is_read_from_small_to_large(network: Point2Sequence) -> None:
     sequence = torch.randn(1, 3, 4, 128, generator=torch.Generator().manual_seed(0))
-    memory, query = network.encode(sequence)
+    memory, query = network.regions(sequence)
     assert memory.shape == (1, 3, 4, 128)
     assert query.shape == (1, 3, 128)
     changed = sequence.clone()
     changed[:, :, 3] += 1
-    later, other = network.encode(changed)
+    later, other = network.regions(changed)
     assert torch.equal(later[:, :, :3], memory[:, :, :3])
     assert not torch.equal(later[:, :, 3], memory[:, :, 3])
     assert not torch.equal(other, query)
@@ -122,7 +122,7 @@ def test_attention_reaches_the_output_unless_as_released(region_feature: str) ->
 def test_region_feature(region_feature: str) -> None:
     network = Point2Sequence(region_feature=region_feature).eval()
     points = clouds()
-    memory, query = network.encode(network.sequence(points, *network.neighbourhoods(points)))
+    memory, query = network.regions(network.sequence(points, *network.neighbourhoods(points)))
     region = network.attention(memory, query) if region_feature == "attention" else query
     expected = network.globals(points, network.region(region))
     torch.testing.assert_close(network.features(points), expected)

@@ -109,7 +109,7 @@ def test_loss_is_the_mean_over_representative_points() -> None:
     network = PointCNN().eval()  # without dropout
     labels = torch.tensor([2, 0])
     loss, logits = network.training_loss(clouds(), labels, label_smoothing=0.1)
-    point_logits = network.point_logits(clouds())
+    point_logits = network.head(network.point_features(clouds()))
     assert point_logits.shape == (2, 128, 3)
     each = [nn.functional.cross_entropy(point_logits[:, p], labels, label_smoothing=0.1) for p in range(128)]
     torch.testing.assert_close(loss, torch.stack(each).mean())

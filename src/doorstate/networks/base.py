@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import ClassVar
+from typing import NamedTuple
 
 from torch import Tensor, nn
 from torch.nn import functional
@@ -16,6 +16,15 @@ Neighbourhoods = tuple[Tensor, ...]
 """Indices (B, ...) into a cloud's points that depend on coordinates alone."""
 
 
+class Encoding(NamedTuple):
+    """What a network makes of a batch of clouds before any head looks at it."""
+
+    features: Tensor
+    """(B, F) of the whole clouds."""
+    inner: tuple[Tensor, ...] = ()
+    """What the network's own loss or its per-point branch needs besides; each network says what."""
+
+
 class PointNetwork(nn.Module, ABC):
     """Classifier of point clouds stored in farthest-point order.
 
@@ -23,9 +32,9 @@ class PointNetwork(nn.Module, ABC):
     are what farthest point sampling from point 0 would choose; representative points are prefixes too.
     """
 
-    min_points: ClassVar[int] = 128
+    min_points: int = 128
     """Fewest points per cloud."""
-    neighbours_keep_under_scale: ClassVar[bool] = True
+    neighbours_keep_under_scale: bool = True
     """Whether `neighbourhoods` of a cloud stay the same when it is scaled; they always do when it is turned."""
     feature_size: int
     """Channels of `features`."""
@@ -51,8 +60,12 @@ class PointNetwork(nn.Module, ABC):
         return
 
     @abstractmethod
+    def encode(self, points: Tensor, neighbourhoods: Neighbourhoods | None = None) -> Encoding:
+        """Everything before the heads, of (B, N, 3) points."""
+
     def features(self, points: Tensor, neighbourhoods: Neighbourhoods | None = None) -> Tensor:
         """(B, F) global features of (B, N, 3) points."""
+        return self.encode(points, neighbourhoods).features
 
     def forward(self, points: Tensor, neighbourhoods: Neighbourhoods | None = None) -> Tensor:
         """Classify clouds.
@@ -89,7 +102,12 @@ class PointNetwork(nn.Module, ABC):
         Returns:
             Scalar loss and (B, num_classes) logits.
         """
-        logits = self(points, neighbourhoods)
+        self.check(points)
+        return self.loss_of(self.encode(points, neighbourhoods), labels, label_smoothing)
+
+    def loss_of(self, encoding: Encoding, labels: Tensor, label_smoothing: float) -> tuple[Tensor, Tensor]:
+        """As `training_loss`, of clouds that are encoded."""
+        logits = at_least_float32(self.head(encoding.features))
         return functional.cross_entropy(logits, labels, label_smoothing=label_smoothing), logits
 
     def check(self, points: Tensor) -> None:

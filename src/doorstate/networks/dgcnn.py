@@ -9,7 +9,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from doorstate.networks.base import Neighbourhoods, PointNetwork
+from doorstate.networks.base import Encoding, Neighbourhoods, PointNetwork
 from doorstate.networks.layers import RowBatchNorm, set_batchnorm
 from doorstate.networks.ops import full_precision, gather_rows, max_over_points, neighbour_max, neighbour_sum
 from doorstate.networks.search import knn, spatial_order
@@ -127,11 +127,14 @@ class DGCNN(PointNetwork):
                 outputs.append(features)
         return outputs
 
-    def features(self, points: Tensor, neighbourhoods: Neighbourhoods | None = None) -> Tensor:
-        """(B, 2048) maximum and mean over the points, whatever their order."""
+    def encode(self, points: Tensor, neighbourhoods: Neighbourhoods | None = None) -> Encoding:
+        """Features (B, 2048) are maximum and mean over the points.
+
+        Inner: (B, N) spatial order, (B, N, 512) outputs of the edge convolutions in that order.
+        """
         order, neighbours = neighbourhoods or self.neighbourhoods(points)
-        edges = self.edge_features(gather_rows(points, order), neighbours)
+        edges = torch.cat(self.edge_features(gather_rows(points, order), neighbours), dim=-1)
         linear, norm = cast(nn.Linear, self.aggregate[0]), cast(RowBatchNorm, self.aggregate[1])
-        rows = norm.after(linear, torch.cat(edges, dim=-1))  # (B, N, 1024)
+        rows = norm.after(linear, edges)  # (B, N, 1024)
         rows = functional.leaky_relu_(rows, _SLOPE)
-        return torch.cat([max_over_points(rows), rows.mean(dim=1)], dim=-1)
+        return Encoding(torch.cat([max_over_points(rows), rows.mean(dim=1)], dim=-1), (order, edges))

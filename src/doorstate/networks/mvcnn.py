@@ -11,7 +11,7 @@ import math
 import torch
 from torch import Tensor, nn
 
-from doorstate.networks.base import Neighbourhoods, PointNetwork
+from doorstate.networks.base import Encoding, Neighbourhoods, PointNetwork
 from doorstate.networks.layers import classification_head
 from doorstate.networks.ops import full_precision
 
@@ -68,11 +68,11 @@ class MVCNN(PointNetwork):
         near = empty.scatter_reduce(2, pixel, nearness, "amax")
         return torch.stack([filled, near], dim=2).reshape(*pixel.shape[:2], 2, self.pixels, self.pixels)
 
-    def features(self, points: Tensor, neighbourhoods: Neighbourhoods | None = None) -> Tensor:
-        """(B, 256) maximum over the views."""
+    def encode(self, points: Tensor, neighbourhoods: Neighbourhoods | None = None) -> Encoding:
+        """Features (B, 256) are the maximum over the views."""
         images = self.render(points)
         features: Tensor = self.cnn(images.flatten(0, 1).contiguous(memory_format=torch.channels_last))
-        return features.reshape(*images.shape[:2], self.feature_size).amax(dim=1)
+        return Encoding(features.reshape(*images.shape[:2], self.feature_size).amax(dim=1))
 
 
 def _turns() -> Tensor:

@@ -11,7 +11,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from doorstate.errors import ConfigError
-from doorstate.networks.base import Neighbourhoods, PointNetwork
+from doorstate.networks.base import Encoding, Neighbourhoods, PointNetwork
 from doorstate.networks.layers import (
     Dense,
     PooledMLP,
@@ -133,7 +133,7 @@ class Point2Sequence(PointNetwork):
         areas = [mlp(offsets[:, :, :size]) for size, mlp in zip(AREAS, self.mlps, strict=True)]
         return torch.stack(areas, dim=2)
 
-    def encode(self, sequence: Tensor) -> tuple[Tensor, Tensor]:
+    def regions(self, sequence: Tensor) -> tuple[Tensor, Tensor]:
         """Encoder states (B, M, 4, 128) and the decoder's hidden state (B, M, 128) of a sequence."""
         state: State | None = None
         memory = []
@@ -143,10 +143,9 @@ class Point2Sequence(PointNetwork):
         hidden, _ = self.decoder(memory[-1])  # one step; the previous attention is zero
         return torch.stack(memory, dim=2), hidden
 
-    def features(self, points: Tensor, neighbourhoods: Neighbourhoods | None = None) -> Tensor:
-        """(B, 1024) maximum over the centres, whose coordinates enter absolutely."""
+    def encode(self, points: Tensor, neighbourhoods: Neighbourhoods | None = None) -> Encoding:
+        """Features (B, 1024) are the maximum over the centres, whose coordinates enter absolutely."""
         (neighbours,) = neighbourhoods or self.neighbourhoods(points)
-        region, query = self.encode(self.sequence(points, neighbours))
+        region, query = self.regions(self.sequence(points, neighbours))
         region = self.attention(region, query) if self.region_feature == "attention" else query
-        pooled: Tensor = self.globals(points[:, : self.num_centres], self.region(region))
-        return pooled
+        return Encoding(self.globals(points[:, : self.num_centres], self.region(region)))

@@ -13,7 +13,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from doorstate.networks.base import Neighbourhoods, PointNetwork
+from doorstate.networks.base import Encoding, Neighbourhoods, PointNetwork
 from doorstate.networks.layers import PointLinear, RowBatchNorm, set_batchnorm
 from doorstate.networks.ops import at_least_float32, full_precision, gather_rows, weigh_neighbours
 from doorstate.networks.search import knn
@@ -208,23 +208,14 @@ class PointCNN(PointNetwork):
         rows: Tensor = self.dense(features)
         return rows
 
-    def features(self, points: Tensor, neighbourhoods: Neighbourhoods | None = None) -> Tensor:
-        """(B, 192) mean of `point_features`."""
-        return at_least_float32(self.point_features(points, neighbourhoods)).mean(dim=1)
+    def encode(self, points: Tensor, neighbourhoods: Neighbourhoods | None = None) -> Encoding:
+        """Features (B, 192) are the mean of `point_features`, which are the inner ones."""
+        rows = self.point_features(points, neighbourhoods)
+        return Encoding(at_least_float32(rows).mean(dim=1), (rows,))
 
-    def point_logits(self, points: Tensor, neighbourhoods: Neighbourhoods | None = None) -> Tensor:
-        """(B, P, num_classes) logits of the representative points of the last level."""
-        return at_least_float32(self.head(self.point_features(points, neighbourhoods)))
-
-    def training_loss(
-        self,
-        points: Tensor,
-        labels: Tensor,
-        label_smoothing: float = 0.0,
-        neighbourhoods: Neighbourhoods | None = None,
-    ) -> tuple[Tensor, Tensor]:
+    def loss_of(self, encoding: Encoding, labels: Tensor, label_smoothing: float) -> tuple[Tensor, Tensor]:
         """Mean cross entropy of all representative points; the logits returned are their mean."""
-        logits = self.point_logits(points, neighbourhoods)  # (B, P, C)
+        logits = at_least_float32(self.head(encoding.inner[0]))  # (B, P, C)
         tiled = labels.unsqueeze(1).expand(logits.shape[:2])  # (B, P)
         loss = functional.cross_entropy(
             logits.flatten(0, 1), tiled.flatten(), label_smoothing=label_smoothing

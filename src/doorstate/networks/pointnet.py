@@ -5,9 +5,8 @@ from __future__ import annotations
 
 import torch
 from torch import Tensor, nn
-from torch.nn import functional
 
-from doorstate.networks.base import Neighbourhoods, PointNetwork
+from doorstate.networks.base import Encoding, Neighbourhoods, PointNetwork
 from doorstate.networks.layers import Dense, DenseMax, PointMLP, classification_head, set_batchnorm
 from doorstate.networks.ops import at_least_float32, full_precision
 
@@ -57,35 +56,23 @@ class PointNet(PointNetwork):
         self.head = classification_head(self.feature_size, num_classes, dropout=0.3)
         set_batchnorm(self, eps=batchnorm_eps)
 
-    def features(self, points: Tensor, neighbourhoods: Neighbourhoods | None = None) -> Tensor:
-        """(B, 1024) maximum over the points."""
-        return self._encode(points)[0]
-
-    def training_loss(
-        self,
-        points: Tensor,
-        labels: Tensor,
-        label_smoothing: float = 0.0,
-        neighbourhoods: Neighbourhoods | None = None,
-    ) -> tuple[Tensor, Tensor]:
-        """Cross entropy + weight/2 * sum over the batch of |A A^T - I|_F^2, A the feature transform.
-
-        A sum, not a mean, as TensorFlow's l2_loss in the original: its weight grows with the batch.
-        """
-        self.check(points)
-        features, transform = self._encode(points)
-        logits = at_least_float32(self.head(features))
-        loss = functional.cross_entropy(logits, labels, label_smoothing=label_smoothing)
-        return loss + self.regularizer_weight * orthogonality_penalty(transform), logits
-
-    def _encode(self, points: Tensor) -> tuple[Tensor, Tensor]:
-        """(B, 1024) features and the (B, 64, 64) feature transform."""
+    def encode(self, points: Tensor, neighbourhoods: Neighbourhoods | None = None) -> Encoding:
+        """Features (B, 1024) are the maximum over the points; inner: (B, 64, 64) feature transform, (B, N, 64) rows."""
         rotation = self.input_transform(points)  # (B, 3, 3)
         with full_precision(points):
             aligned = points @ rotation  # (B, N, 3)
         rows = self.local(aligned)  # (B, N, 64)
         transform = self.feature_transform(rows)  # (B, 64, 64)
-        return self.encoder(rows @ transform), transform
+        rows = rows @ transform
+        return Encoding(self.encoder(rows), (transform, rows))
+
+    def loss_of(self, encoding: Encoding, labels: Tensor, label_smoothing: float) -> tuple[Tensor, Tensor]:
+        """Cross entropy + weight/2 * sum over the batch of |A A^T - I|_F^2, A the feature transform.
+
+        A sum, not a mean, as TensorFlow's l2_loss in the original: its weight grows with the batch.
+        """
+        loss, logits = super().loss_of(encoding, labels, label_smoothing)
+        return loss + self.regularizer_weight * orthogonality_penalty(encoding.inner[0]), logits
 
 
 def orthogonality_penalty(transform: Tensor) -> Tensor:

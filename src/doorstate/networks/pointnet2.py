@@ -10,7 +10,7 @@ import torch
 from torch import Tensor, nn
 
 from doorstate.errors import ConfigError
-from doorstate.networks.base import Neighbourhoods, PointNetwork
+from doorstate.networks.base import Encoding, Neighbourhoods, PointNetwork
 from doorstate.networks.layers import PooledMLP, classification_head, set_batchnorm
 from doorstate.networks.ops import gather_rows
 from doorstate.networks.search import ball_query
@@ -126,11 +126,13 @@ class PointNet2(PointNetwork):
             points[:, : self.level1.num_centres]
         )
 
-    def features(self, points: Tensor, neighbourhoods: Neighbourhoods | None = None) -> Tensor:
-        """(B, 1024) maximum over the centres of the second level, whose coordinates enter absolutely."""
+    def encode(self, points: Tensor, neighbourhoods: Neighbourhoods | None = None) -> Encoding:
+        """Features (B, 1024) are the maximum over the centres of the second level, whose coordinates enter absolutely.
+
+        Inner: (B, M, C) features of the centres of both levels, which are the first M points.
+        """
         balls = neighbourhoods or self.neighbourhoods(points)
         scales = len(self.level1.balls)
-        centres, features = self.level1(points, None, balls[:scales])
-        centres, features = self.level2(centres, features, balls[scales:])
-        pooled: Tensor = self.level3(centres, features)
-        return pooled
+        centres, first = self.level1(points, None, balls[:scales])
+        centres, second = self.level2(centres, first, balls[scales:])
+        return Encoding(self.level3(centres, second), (first, second))
