@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Ask for the door in one cloud, and deal with every kind of answer.
+
+    python examples/one_cloud.py cloud.pcd && echo go
+
+Exit code: 0 the door is open, 1 it is not, 2 nobody can tell. A program that moves something should know all three.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from doorstate import DoorState, Predictor, read_cloud
+from doorstate.errors import CloudError
+
+
+def main(path: Path) -> int:
+    """Print what is known, and give the exit code."""
+    predictor = Predictor.load()  # once: loading takes longer than answering
+    try:
+        prediction = predictor(read_cloud(path))
+    except CloudError as error:  # the file cannot be read, or what it holds is no cloud
+        print(f"unusable: {error}")
+        return 2
+    if prediction.state is None:  # too much is missing: the gate says what
+        print(f"unknown: {prediction.reason}")
+        return 2
+    label = prediction.state.label
+    print(f"{label}, probability {prediction.probabilities[label]:.2f}")
+    return 0 if prediction.state == DoorState.OPEN else 1
+
+
+if __name__ == "__main__":
+    if len(sys.argv) != 2:
+        sys.exit(__doc__)
+    sys.exit(main(Path(sys.argv[1])))

@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Follow a door over time without flicker, then wait until it has been open for a second.
+
+    python examples/stream.py door-bag
+
+`StateFilter` and `wait_for` take any stamped clouds: here a recording, on a robot what the driver of the camera gives.
+Exit code 0 if the door came to be open, 1 if not. Needs the extra `bags`.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+from doorstate import StateFilter, wait_for
+from doorstate.clouds.bags import open_bag
+from doorstate.deployment.rule_predictor import RulePredictor
+from doorstate.errors import DoorstateError
+from doorstate.types import Points
+
+
+def stamped_clouds(recording: Path) -> Iterator[tuple[float, Points]]:
+    """Seconds and clouds; put your camera here."""
+    with open_bag(recording) as bag:
+        for stamp_s, _, cloud in bag.clouds(bag.choose()):
+            if not isinstance(cloud, DoorstateError):
+                yield stamp_s, cloud
+
+
+def main(recording: Path) -> int:
+    """Print what changes, then wait; give the exit code."""
+    predictor = RulePredictor.load("plane_state")  # or Predictor.load(budget_ms=33)
+    state_filter = StateFilter()
+    first_s = before = None
+    for stamp_s, cloud in stamped_clouds(recording):
+        first_s = stamp_s if first_s is None else first_s
+        prediction = predictor(cloud)
+        door = state_filter.update(prediction, stamp_s)
+        now = (prediction.state, door.state)
+        if now != before:
+            single, filtered = (state.label if state is not None else "unknown" for state in now)
+            print(f"{stamp_s - first_s:4.1f} s  this frame: {single:9}  filtered: {filtered}")
+            before = now
+    if wait_for("open", stamped_clouds(recording), timeout_s=30, hold_s=1.0, predictor=predictor):
+        print("the way is free")
+        return 0
+    print("still not open: ask for help")
+    return 1
+
+
+if __name__ == "__main__":
+    if len(sys.argv) != 2:
+        sys.exit(__doc__)
+    sys.exit(main(Path(sys.argv[1])))

@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Every script in examples/ runs as its docstring says, on simulated doors, and says what is true."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rosbags")
+
+from doorstate.clouds.io import read_cloud
+from doorstate.clouds.pcd import write_pcd
+from doorstate.simulation.generate import PRESETS, simulate_pose
+from doorstate.simulation.run import SimulationSettings, simulate_dataset
+from doorstate.types import STATES
+
+EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
+
+
+def example(name: str, *arguments: object, code: int = 0) -> str:
+    """Standard output of an example, which ends with a code."""
+    command = [sys.executable, "-W", "error", EXAMPLES / f"{name}.py", *map(str, arguments)]
+    finished = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert finished.returncode == code, finished.stderr
+    return finished.stdout
+
+
+def thinned(source: Path, names: str, step: int, target: Path) -> Path:
+    """Labelled clouds in folders, with some rows and columns of the simulated ones."""
+    for path in sorted((source / "pcd").rglob(names)):
+        write_pcd(target / path.parent.name / path.name, read_cloud(path)[::step, ::step])
+    return target
+
+
+@pytest.fixture(scope="module")
+def doors(simulated_folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Twelve of each state, 160 x 120 pixels."""
+    return thinned(simulated_folder, "*.pcd", 4, tmp_path_factory.mktemp("labelled"))
+
+
+@pytest.fixture(scope="module")
+def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What make_bag.py records."""
+    folder = tmp_path_factory.mktemp("recording") / "door-bag"
+    assert "40 depth images in 8 s" in example("make_bag", folder)
+    return folder
+
+
+def test_every_example_is_run_here_and_says_how_to_run_it() -> None:
+    here = Path(__file__).read_text(encoding="utf-8")
+    for path in EXAMPLES.glob("*.py"):
+        assert f'example("{path.stem}", ' in here
+        assert re.search(
+            rf"^    python examples/{path.name} ", path.read_text(encoding="utf-8"), re.MULTILINE
+        )
+
+
+def test_one_cloud_tells_all_kinds_of_answers_apart(simulated_folder: Path, tmp_path: Path) -> None:
+    opened, closed = (
+        sorted((simulated_folder / "pcd" / state).glob("*.pcd"))[0] for state in ("open", "closed")
+    )
+    assert example("one_cloud", opened).startswith("open, probability 0.")
+    assert example("one_cloud", closed, code=1).startswith("closed, probability 0.")
+    cloud = read_cloud(opened)
+    cloud[:, :320] = np.nan
+    write_pcd(tmp_path / "half.pcd", cloud)
+    assert example("one_cloud", tmp_path / "half.pcd", code=2).startswith("unknown: ")
+    (tmp_path / "empty.pcd").touch()
+    assert example("one_cloud", tmp_path / "empty.pcd", code=2) == "unusable: empty.pcd: is empty (0 bytes)\n"
+
+
+def test_depth_image_tells_the_angle(tmp_path: Path) -> None:
+    preset = PRESETS["ogurob"]
+    simulate_dataset(
+        tmp_path / "doors", SimulationSettings(preset=preset, seed=3, poses=1, raw=("depth",)), 1
+    )
+    (picture,) = (tmp_path / "doors" / "depth" / "semi_open").glob("*.png")
+    lens = preset.camera.intrinsics()
+    (tmp_path / "camera.json").write_text(json.dumps(vars(lens)))
+    said = example("depth_image", picture, tmp_path / "camera.json")
+    found = re.fullmatch(r"measured: \d+% of the pixels\nsemi_open, opened by (\d+) degrees\n", said)
+    rows, _ = simulate_pose(preset, 3, int(picture.stem[1:5]))
+    assert found
+    assert float(found[1]) == pytest.approx(rows[STATES.index("semi_open")].opening_angle_deg, abs=3)
+
+
+def test_bag_to_csv_has_a_row_for_every_change(bag: Path, tmp_path: Path) -> None:
+    table = tmp_path / "changes.csv"
+    assert "40 messages of /camera/depth/image_rect_raw" in example("bag_to_csv", bag, table)
+    with table.open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert [row["state"] for row in rows] == ["closed", "semi_open", "open"]
+    # The door begins to open at 3 s, is semi-open from 15 degrees on and open from 75.
+    began, semi_open, opened = (float(row["stamp_s"]) - 1_700_000_000 for row in rows)
+    assert (began, semi_open, opened) == (0, pytest.approx(3.33, abs=0.4), pytest.approx(4.67, abs=0.4))
+
+
+def test_stream_follows_the_door_and_waits_for_it(bag: Path) -> None:
+    *changes, last = example("stream", bag).splitlines()
+    assert last == "the way is free"
+    filtered = [line.rpartition(" ")[2] for line in changes]
+    assert list(dict.fromkeys(filtered)) == ["unknown", *STATES]
+    assert changes[-1].endswith("this frame: open       filtered: open")
+
+
+def test_choose_rule_counts_every_cloud(simulated_folder: Path, tmp_path: Path) -> None:
+    first, _, *rows = example("choose_rule", thinned(simulated_folder, "p03*.pcd", 2, tmp_path)).splitlines()
+    counts = {name: [int(number) for number in numbers] for name, *numbers in map(str.split, rows)}
+    assert first == "9 clouds"
+    assert {sum(numbers[:3]) for numbers in counts.values()} == {9}
+    assert counts["wall_leaf_angle"][0] == 9
+    *_, with_gate, without = zip(*counts.values(), strict=True)
+    assert (sum(with_gate), sum(without)) == (0, 1)
+
+
+def test_train_own_gives_weights_that_answer(doors: Path, tmp_path: Path) -> None:
+    options = ("--network", "pointnet", "--points", 128, "--epochs", 1)
+    said = example("train_own", doors, "--out", tmp_path / "trained", *options)
+    assert re.search(r"macro-F1 0\.\d+ on \d clouds not trained on\n", said)
+    assert re.search(r"\.pcd: <DoorState\.\w+: [012]>\n$", said)
+
+
+def test_onnx_robot_needs_no_torch(doors: Path, weights: Path, tmp_path: Path) -> None:
+    pytest.importorskip("onnxruntime")
+    exported, recording = tmp_path / "door.onnx", tmp_path / "recording"
+    doorstate = Path(sys.executable).with_name("doorstate")
+    command = [doorstate, "export", "pointnet", "--weights", weights, "--out", exported, "--clouds", "3"]
+    subprocess.run(command, check=True, capture_output=True)
+    shutil.copytree(doors / "open", recording)
+    *answers, last = example("onnx_robot", exported, recording).splitlines()
+    assert len(answers) == 12
+    assert all(
+        re.fullmatch(r"p\d+-open\.pcd: (closed|semi_open|open)( \(late\))?", answer) for answer in answers
+    )
+    assert last.endswith("torch loaded: False")
