@@ -168,3 +168,13 @@ def test_a_centre_is_at_zero_offset_in_its_own_ball() -> None:
     own = indices == torch.arange(8).view(1, 8, 1)
     assert own.any(-1).all()
     assert (offsets[own] == 0).all()
+
+
+def test_knn_of_more_queries_than_points() -> None:
+    points = cloud(3, 90, 3, seed=1)
+    query = torch.cat([points, cloud(3, 400, 3, seed=2)], dim=1)
+    found = knn(query, points, 4)
+    for each in range(3):
+        neighbours = NearestNeighbors(n_neighbors=4).fit(points[each].numpy())
+        expected = neighbours.kneighbors(query[each].numpy(), return_distance=False)
+        assert found[each].tolist() == expected.tolist()

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from torch import Tensor, nn
 from torch.nn import functional
 
-from doorstate.errors import CloudContentError
+from doorstate.errors import CloudContentError, ConfigError
 from doorstate.networks.ops import at_least_float32
 
 Neighbourhoods = tuple[Tensor, ...]
@@ -41,6 +41,11 @@ class PointNetwork(nn.Module, ABC):
     head: nn.Module
     """From features to logits."""
 
+    def __init__(self) -> None:
+        super().__init__()
+        self.heads = nn.ModuleDict()
+        """Further answers by name (networks.heads); none in the paper's networks."""
+
     def neighbourhoods(self, points: Tensor) -> Neighbourhoods:
         """Neighbours that the network looks for among the coordinates, so that they can be kept for the next epoch.
 
@@ -66,6 +71,14 @@ class PointNetwork(nn.Module, ABC):
     def features(self, points: Tensor, neighbourhoods: Neighbourhoods | None = None) -> Tensor:
         """(B, F) global features of (B, N, 3) points."""
         return self.encode(points, neighbourhoods).features
+
+    def part_branch(self, num_parts: int) -> nn.Module:
+        """A module from (points, encoding) to (B, N, num_parts) logits of every point's part.
+
+        Raises:
+            ConfigError: the network has no features of single points.
+        """
+        raise ConfigError(f"{type(self).__name__} has no per-point branch: leave out the head 'parts'")
 
     def forward(self, points: Tensor, neighbourhoods: Neighbourhoods | None = None) -> Tensor:
         """Classify clouds.

@@ -10,7 +10,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from doorstate.networks.base import Encoding, Neighbourhoods, PointNetwork
-from doorstate.networks.layers import RowBatchNorm, set_batchnorm
+from doorstate.networks.layers import Dense, JoinedDense, RowBatchNorm, glorot, set_batchnorm
 from doorstate.networks.ops import full_precision, gather_rows, max_over_points, neighbour_max, neighbour_sum
 from doorstate.networks.search import knn, spatial_order
 
@@ -65,6 +65,21 @@ def edge_moments(features: Tensor, indices: Tensor) -> tuple[Tensor, Tensor]:
     step_step = end_end - end_own - step_own.T - torch.outer(mean_end, mean_end)
     covariance = torch.cat([torch.cat([step_step, step_own], 1), torch.cat([step_own.T, own_own], 1)])
     return torch.cat([mean_end, mean]), covariance
+
+
+class PartBranch(nn.Module):
+    """The paper's segmentation: each point's edge features beside the cloud's; one layer fewer than its three."""
+
+    def __init__(self, num_parts: int) -> None:
+        super().__init__()
+        self.joined = JoinedDense(512, 2048, 256)
+        self.rest = nn.Sequential(Dense(256, 128), glorot(nn.Linear(128, num_parts)))
+
+    def forward(self, points: Tensor, encoding: Encoding) -> Tensor:
+        """(B, N, num_parts) logits in the order of the points."""
+        order, edges = encoding.inner
+        logits: Tensor = self.rest(self.joined(edges, encoding.features))
+        return gather_rows(logits, order.argsort(dim=1))
 
 
 class DGCNN(PointNetwork):
@@ -126,6 +141,9 @@ class DGCNN(PointNetwork):
                 features = conv(features, neighbours)
                 outputs.append(features)
         return outputs
+
+    def part_branch(self, num_parts: int) -> nn.Module:
+        return PartBranch(num_parts)
 
     def encode(self, points: Tensor, neighbourhoods: Neighbourhoods | None = None) -> Encoding:
         """Features (B, 2048) are maximum and mean over the points.

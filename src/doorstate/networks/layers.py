@@ -148,6 +148,21 @@ def classification_head(in_channels: int, num_classes: int, dropout: float) -> n
     )
 
 
+class JoinedDense(nn.Module):
+    """Dense layer on [a point's features; its cloud's features], whose second product is taken once per cloud."""
+
+    def __init__(self, num_features: int, cloud_features: int, out_channels: int) -> None:
+        super().__init__()
+        self.own = glorot(nn.Linear(num_features, out_channels, bias=False))
+        self.cloud = glorot(nn.Linear(cloud_features, out_channels, bias=False))
+        self.norm = RowBatchNorm(out_channels)
+
+    def forward(self, rows: Tensor, features: Tensor) -> Tensor:
+        """(B, N, out_channels) of (B, N, C) rows and (B, F) features of their clouds."""
+        out: Tensor = self.norm(self.own(rows) + self.cloud(features).unsqueeze(1))
+        return out.relu_()
+
+
 class PointLinear(nn.Linear):
     """Linear layer on [coordinates; features], whose coordinate part ignores autocast.
 

@@ -7,7 +7,15 @@ import torch
 from torch import Tensor, nn
 
 from doorstate.networks.base import Encoding, Neighbourhoods, PointNetwork
-from doorstate.networks.layers import Dense, DenseMax, PointMLP, classification_head, set_batchnorm
+from doorstate.networks.layers import (
+    Dense,
+    DenseMax,
+    JoinedDense,
+    PointMLP,
+    classification_head,
+    glorot,
+    set_batchnorm,
+)
 from doorstate.networks.ops import at_least_float32, full_precision
 
 
@@ -33,6 +41,20 @@ class TransformNet(nn.Module):
         return transform
 
 
+class PartBranch(nn.Module):
+    """The paper's segmentation: each point's row beside the cloud's features; narrower than its 512, 256, 128."""
+
+    def __init__(self, num_parts: int) -> None:
+        super().__init__()
+        self.joined = JoinedDense(64, 1024, 256)
+        self.rest = nn.Sequential(Dense(256, 128), glorot(nn.Linear(128, num_parts)))
+
+    def forward(self, points: Tensor, encoding: Encoding) -> Tensor:
+        """(B, N, num_parts) logits."""
+        logits: Tensor = self.rest(self.joined(encoding.inner[1], encoding.features))
+        return logits
+
+
 class PointNet(PointNetwork):
     """PointNet with input and feature transform.
 
@@ -55,6 +77,9 @@ class PointNet(PointNetwork):
         self.encoder = nn.Sequential(Dense(64, 64), Dense(64, 128), DenseMax(128, 1024))
         self.head = classification_head(self.feature_size, num_classes, dropout=0.3)
         set_batchnorm(self, eps=batchnorm_eps)
+
+    def part_branch(self, num_parts: int) -> nn.Module:
+        return PartBranch(num_parts)
 
     def encode(self, points: Tensor, neighbourhoods: Neighbourhoods | None = None) -> Encoding:
         """Features (B, 1024) are the maximum over the points; inner: (B, 64, 64) feature transform, (B, N, 64) rows."""

@@ -11,9 +11,16 @@ from torch import Tensor, nn
 
 from doorstate.errors import ConfigError
 from doorstate.networks.base import Encoding, Neighbourhoods, PointNetwork
-from doorstate.networks.layers import PooledMLP, classification_head, set_batchnorm
-from doorstate.networks.ops import gather_rows
-from doorstate.networks.search import ball_query
+from doorstate.networks.layers import (
+    Dense,
+    PooledMLP,
+    RowBatchNorm,
+    classification_head,
+    glorot,
+    set_batchnorm,
+)
+from doorstate.networks.ops import full_precision, gather_rows
+from doorstate.networks.search import ball_query, knn
 
 
 class Scale(NamedTuple):
@@ -76,6 +83,50 @@ class SetAbstraction(nn.Module):
         return centres, torch.cat(pooled, dim=-1)
 
 
+class PartBranch(nn.Module):
+    """The paper's segmentation: features travel back to the centres, and from them to the points near each.
+
+    Three nearest centres, weighed by inverse squared distance. A linear layer commutes with that mean, so it is applied
+    to the few centres before.
+    """
+
+    def __init__(self, num_parts: int, first: int, second: int) -> None:
+        super().__init__()
+        self.second = nn.Sequential(Dense(second + 1024, 256), glorot(nn.Linear(256, 256)))
+        self.first = glorot(nn.Linear(first, 256))
+        self.first_norm = RowBatchNorm(256)
+        self.between = glorot(nn.Linear(256, 128))
+        self.norm = RowBatchNorm(128)
+        self.rest = nn.Sequential(nn.ReLU(), Dense(128, 128), glorot(nn.Linear(128, num_parts)))
+
+    def forward(self, points: Tensor, encoding: Encoding) -> Tensor:
+        """(B, N, num_parts) logits."""
+        first, second = encoding.inner
+        near, far = points[:, : first.shape[1]], points[:, : second.shape[1]]
+        cloud = encoding.features.unsqueeze(1).expand(-1, second.shape[1], -1)
+        rows = self.first(first) + interpolate(self.second(torch.cat([second, cloud], dim=-1)), far, near)
+        rows = self.between(self.first_norm(rows).relu())
+        logits: Tensor = self.rest(self.norm(interpolate(rows, near, points)))
+        return logits
+
+
+def interpolate(features: Tensor, centres: Tensor, points: Tensor) -> Tensor:
+    """(B, N, C) mean of the features of the three centres nearest to each point, weighed by 1 / distance^2.
+
+    Args:
+        features: (B, M, C) of the centres.
+        centres: (B, M, 3).
+        points: (B, N, 3).
+    """
+    nearest = knn(points, centres, 3)  # (B, N, 3)
+    with full_precision(points):
+        squares = (gather_rows(centres, nearest) - points.unsqueeze(2)).square().sum(dim=-1)
+        weight = 1 / (squares + 1e-8)
+        weight = weight / weight.sum(dim=-1, keepdim=True)
+    mean: Tensor = (gather_rows(features, nearest) * weight.unsqueeze(-1).to(features.dtype)).sum(dim=2)
+    return mean
+
+
 class PointNet2(PointNetwork):
     """PointNet++ for classification, with single-scale ("ssg") or multi-scale ("msg") grouping.
 
@@ -125,6 +176,9 @@ class PointNet2(PointNetwork):
         return self.level1.neighbourhoods(points) + self.level2.neighbourhoods(
             points[:, : self.level1.num_centres]
         )
+
+    def part_branch(self, num_parts: int) -> nn.Module:
+        return PartBranch(num_parts, self.level1.out_channels, self.level2.out_channels)
 
     def encode(self, points: Tensor, neighbourhoods: Neighbourhoods | None = None) -> Encoding:
         """Features (B, 1024) are the maximum over the centres of the second level, whose coordinates enter absolutely.

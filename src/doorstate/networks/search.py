@@ -52,10 +52,10 @@ def knn(query: Tensor, points: Tensor, k: int, *, in_order: bool = False) -> Ten
     """Nearest neighbours, nearest first.
 
     A query equal to the point of the same index is that point: it comes first, whatever duplicates it has
-    (all networks query a prefix of the points).
+    (networks query a prefix of the points, or points of which the first are these).
 
     Args:
-        query: (B, M, D), M <= N.
+        query: (B, M, D).
         points: (B, N, D).
         k: number of neighbours; at most N are returned.
         in_order: points come in `spatial_order` already, of themselves or of what they were computed from.
@@ -143,11 +143,13 @@ def _nearest_of_all(query: Tensor, points: Tensor, k: int) -> Tensor:
     for start in range(0, query.shape[1], block_size):
         block = query[:, start : start + block_size]
         distances = find_distances(block, points)  # (B, m, N)
-        same_index = torch.arange(start, start + block.shape[1], device=points.device)  # (m,)
-        same = (block == points[:, start : start + block.shape[1]]).all(-1, keepdim=True)  # (B, m, 1)
+        twins = points[:, start : start + block.shape[1]]  # fewer, or none, where there are more queries than points
+        same = (block[:, : twins.shape[1]] == twins).all(-1, keepdim=True)  # (B, m, 1)
+        same_index = torch.arange(start, start + twins.shape[1], device=points.device)  # (m,)
         column = same_index.view(1, -1, 1).expand_as(same)
-        own = torch.where(same, -torch.inf, distances.gather(2, column))
-        found.append(distances.scatter_(2, column, own).topk(k, largest=False).indices)
+        with_twin = distances[:, : twins.shape[1]]
+        with_twin.scatter_(2, column, torch.where(same, -torch.inf, with_twin.gather(2, column)))
+        found.append(distances.topk(k, largest=False).indices)
     return torch.cat(found, dim=1)
 
 

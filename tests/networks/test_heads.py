@@ -1,0 +1,194 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What networks say besides the state: shapes, losses worked by hand; a network without heads stays as it is."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import torch
+from scipy.spatial import cKDTree
+from torch import Tensor
+
+from doorstate.errors import ConfigError
+from doorstate.networks import create_network, list_networks
+from doorstate.networks.base import PointNetwork
+from doorstate.networks.heads import (
+    HEADS,
+    FramePose,
+    Head,
+    HingeSide,
+    OpeningAngle,
+    Widths,
+    answers,
+    give_heads,
+    joint_losses,
+)
+from doorstate.networks.layers import JoinedDense
+from doorstate.networks.pointnet2 import interpolate
+
+WITH_PARTS = ("pointnet", "pointnet2", "dgcnn")
+LABELS = torch.tensor([0, 3, 1])
+
+
+def clouds(num_points: int = 160) -> Tensor:
+    return torch.rand(3, num_points, 3, generator=torch.Generator().manual_seed(1)) * 2 - 1
+
+
+def targets(num_points: int = 160) -> dict[str, Tensor]:
+    """Of three clouds, the second without a door."""
+    nan = math.nan
+    return {
+        "angle": torch.tensor([[0.1], [nan], [1.2]]),
+        "hinge": torch.tensor([[1.0], [nan], [0.0]]),
+        "frame": torch.tensor([[0.2, -0.1, 3.0], [nan] * 3, [0.3, 0.0, -3.1]]),
+        "widths": torch.tensor([[0.3, 0.0], [nan] * 2, [0.31, 0.2]]),
+        "parts": torch.arange(3 * num_points).reshape(3, num_points) % 7 - 1,
+    }
+
+
+def headed(name: str) -> PointNetwork:
+    torch.manual_seed(0)
+    network = create_network(name, 4)
+    give_heads(network, [*HEADS, *(["parts"] if name in WITH_PARTS else [])])
+    return network
+
+
+@pytest.mark.parametrize("name", list_networks())
+def test_every_network_takes_every_head(name: str) -> None:
+    network = headed(name).eval()
+    with torch.inference_mode():
+        found = answers(network, clouds())
+        logits = network(clouds())
+    assert {key: tuple(value.shape) for key, value in found.items() if key in HEADS} == {
+        "angle": (3, 1),
+        "hinge": (3, 1),
+        "frame": (3, 3),
+        "widths": (3, 2),
+    }
+    assert torch.equal(found["state"], logits)
+    assert logits.shape == (3, 4)
+    assert all(value.isfinite().all() and value.dtype == torch.float32 for value in found.values())
+    if name in WITH_PARTS:
+        assert found["parts"].shape == (3, 160, 6)
+
+
+@pytest.mark.parametrize("name", list_networks())
+def test_a_step_lowers_every_loss_and_reaches_every_parameter(name: str) -> None:
+    network = headed(name).train()
+    optimizer = torch.optim.Adam(network.parameters(), 1e-3)
+    first: dict[str, float] = {}
+    for _ in range(6):
+        torch.manual_seed(2)  # the same dropout every time
+        losses, _ = joint_losses(network, clouds(), LABELS, targets())
+        first = first or {key: float(value.detach()) for key, value in losses.items()}
+        optimizer.zero_grad()
+        sum(losses.values(), torch.zeros(())).backward()  # type: ignore[no-untyped-call]
+        assert all(p.grad is not None and p.grad.isfinite().all() for p in network.parameters())
+        optimizer.step()
+    assert set(losses) == {"state", *network.heads}
+    for key, value in losses.items():
+        assert float(value.detach()) < first[key], key
+
+
+@pytest.mark.parametrize("name", list_networks())
+def test_without_heads_the_parameters_are_those_of_the_paper(name: str) -> None:
+    torch.manual_seed(0)
+    plain = create_network(name, 4)
+    with_heads = headed(name)
+    own = {key: value for key, value in with_heads.state_dict().items() if not key.startswith("heads.")}
+    assert list(own) == list(plain.state_dict())
+    assert all(torch.equal(own[key], value) for key, value in plain.state_dict().items())
+
+
+@pytest.mark.parametrize("name", WITH_PARTS)
+def test_parts_follow_their_points(name: str) -> None:
+    """Points after the centres in another order: each keeps its part."""
+    network = headed(name).double().eval()
+    points = clouds(700).double()
+    order = torch.cat(
+        [torch.arange(512), 512 + torch.randperm(188, generator=torch.Generator().manual_seed(3))]
+    )
+    with torch.inference_mode():
+        found, moved = (answers(network, cloud)["parts"] for cloud in (points, points[:, order]))
+    torch.testing.assert_close(moved, found[:, order], atol=1e-9, rtol=0)
+    assert found.std(dim=1).min() > 1e-6
+
+
+def test_unknown_targets_cost_nothing() -> None:
+    network = headed("pointnet2").train()
+    unknown = {key: torch.full_like(value, math.nan) for key, value in targets().items() if key in HEADS}
+    unknown["parts"] = torch.full((3, 160), -1)
+    losses, _ = joint_losses(network, clouds(), LABELS, unknown)
+    assert all(float(losses[key].detach()) == 0 for key in unknown)
+    sum(losses.values(), torch.zeros(())).backward()  # type: ignore[no-untyped-call]
+    assert not any(p.grad is not None and p.grad.any() for p in network.heads.parameters())
+
+
+def test_one_unknown_cloud_leaves_the_mean_of_the_others() -> None:
+    network = headed("pointnet").eval()
+    with torch.inference_mode():
+        losses, _ = joint_losses(network, clouds(), LABELS, targets())
+        features = network.features(clouds())
+    for key, target in targets().items():
+        if key in HEADS:
+            head = network.heads[key]
+            assert isinstance(head, Head)
+            with torch.inference_mode():
+                each = head.losses(head(features), target.nan_to_num())
+            torch.testing.assert_close(losses[key], (each[0] + each[2]) / 2)
+
+
+def test_losses_worked_by_hand() -> None:
+    quarter = torch.tensor([[math.pi / 2]])
+    assert float(OpeningAngle(8).losses(torch.tensor([[0.0, 1.0]]), quarter)) == pytest.approx(0, abs=1e-6)
+    assert float(OpeningAngle(8).losses(torch.tensor([[1.0, 0.0]]), quarter)) == pytest.approx(math.sqrt(2))
+    assert float(HingeSide(8).losses(torch.zeros(1, 1), torch.ones(1, 1))) == pytest.approx(math.log(2))
+    assert float(Widths(8).losses(torch.tensor([[0.5, 0.25]]), torch.tensor([[0.25, 0.5]]))) == pytest.approx(
+        1.5
+    )
+    outputs = torch.tensor([[0.3, 0.4, 1.0, 0.0]])
+    assert float(FramePose(8).losses(outputs, torch.zeros(1, 3))) == pytest.approx(3 * 0.5)
+
+
+def test_angles_near_a_full_turn_are_near_each_other() -> None:
+    head = FramePose(8)
+    outputs = torch.tensor([[0.0, 0.0, math.cos(3.14), math.sin(3.14)]])
+    assert float(head.losses(outputs, torch.tensor([[0.0, 0.0, -3.14]]))) < 0.01
+    assert float(head.decode(outputs)[0, 2]) == pytest.approx(3.14)
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.5, math.pi / 2, 2.9])
+def test_an_angle_comes_back(angle: float) -> None:
+    outputs = 3 * torch.tensor([[math.cos(angle), math.sin(angle)]])
+    assert float(OpeningAngle(8).decode(outputs)) == pytest.approx(angle)
+
+
+def test_interpolation_is_scipys() -> None:
+    points, centres = clouds(300).double(), clouds(40).double()
+    features = torch.rand(3, 40, 5, dtype=torch.float64)
+    found = interpolate(features, centres, points)
+    for cloud in range(3):
+        distance, index = cKDTree(centres[cloud].numpy()).query(points[cloud].numpy(), 3)
+        weight = 1 / (np.square(distance) + 1e-8)
+        weight /= weight.sum(axis=1, keepdims=True)
+        expected = (features[cloud].numpy()[index] * weight[..., None]).sum(axis=1)
+        np.testing.assert_allclose(found[cloud].numpy(), expected, atol=1e-9)
+
+
+def test_a_joined_layer_is_a_layer_on_both() -> None:
+    layer = JoinedDense(4, 6, 5).double()
+    rows, features = torch.rand(2, 7, 4, dtype=torch.float64), torch.rand(2, 6, dtype=torch.float64)
+    both = torch.cat([rows, features.unsqueeze(1).expand(-1, 7, -1)], dim=-1)
+    weight = torch.cat([layer.own.weight, layer.cloud.weight], dim=1)
+    expected = torch.nn.functional.batch_norm((both @ weight.T).flatten(0, 1), None, None, training=True)
+    torch.testing.assert_close(layer(rows, features), expected.relu().view(2, 7, 5))
+
+
+def test_errors_name_what_is_known() -> None:
+    network = create_network("point2sequence")
+    with pytest.raises(ConfigError, match="no head 'angel': did you mean 'angle'"):
+        give_heads(network, ["angel"])
+    with pytest.raises(ConfigError, match="Point2Sequence has no per-point branch"):
+        give_heads(network, ["parts"])
