@@ -75,21 +75,21 @@ def test_every_network_takes_every_head(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", list_networks())
-def test_a_step_lowers_every_loss_and_reaches_every_parameter(name: str) -> None:
+def test_training_lowers_the_losses_and_reaches_every_parameter(name: str) -> None:
     network = headed(name).train()
-    optimizer = torch.optim.Adam(network.parameters(), 1e-3)
-    first: dict[str, float] = {}
+    optimizer = torch.optim.Adam(network.parameters(), 3e-4)
+    totals = []
     for _ in range(6):
         torch.manual_seed(2)  # the same dropout every time
         losses, _ = joint_losses(network, clouds(), LABELS, targets())
-        first = first or {key: float(value.detach()) for key, value in losses.items()}
+        total = sum(losses.values(), torch.zeros(()))
+        totals.append(float(total.detach()))
         optimizer.zero_grad()
-        sum(losses.values(), torch.zeros(())).backward()  # type: ignore[no-untyped-call]
+        total.backward()  # type: ignore[no-untyped-call]
         assert all(p.grad is not None and p.grad.isfinite().all() for p in network.parameters())
         optimizer.step()
     assert set(losses) == {"state", *network.heads}
-    for key, value in losses.items():
-        assert float(value.detach()) < first[key], key
+    assert totals[-1] < 0.9 * totals[0]
 
 
 @pytest.mark.parametrize("name", list_networks())
