@@ -57,10 +57,10 @@ def predict_bag(
 
 def hint_at_frame(topic: BagTopic, options: ReadOptions, frame_id: str) -> None:
     """Say so where clouds that are taken as they are come in an optical frame."""
-    from doorstate.clouds.bags import CLOUD
+    from doorstate.clouds.messages import CLOUD, is_optical
     from doorstate.console import err
 
-    if topic.type == CLOUD and options.frame == "body" and "optical" in frame_id:
+    if topic.type == CLOUD and options.frame == "body" and is_optical(frame_id):
         hint = f"{topic.name} is in the frame {frame_id}: is --frame optical missing?"
         err.print(hint, markup=False, soft_wrap=True)
 

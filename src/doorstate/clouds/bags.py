@@ -15,22 +15,20 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from doorstate.clouds.camera import Intrinsics
-from doorstate.clouds.depth_messages import (
-    check_compressed_format,
-    check_encoding,
-    pixels_from_compressed_depth,
-    pixels_from_image,
+from doorstate.clouds.depth_messages import check_compressed_format, check_encoding
+from doorstate.clouds.io import DEFAULT_OPTIONS, ReadOptions
+from doorstate.clouds.messages import (
+    CAMERA_INFO,
+    CLOUD,
+    COMPRESSED_IMAGE,
+    IMAGE,
+    intrinsics_from_message,
+    points_from_message,
+    stamp_ns_of,
 )
-from doorstate.clouds.io import DEFAULT_OPTIONS, ReadOptions, points_from_depth, points_in_body
-from doorstate.clouds.pointcloud2 import points_from_pointcloud2
 from doorstate.errors import CameraError, CloudReadError, DoorstateError, MissingExtraError
 from doorstate.types import Points
 
-# Message types by the names that ROS 2 gives them; rosbags names those of ROS 1 alike.
-CLOUD = "sensor_msgs/msg/PointCloud2"
-_IMAGE = "sensor_msgs/msg/Image"
-_COMPRESSED = "sensor_msgs/msg/CompressedImage"
-_CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
 _COMPRESSED_DEPTH = "/compressedDepth"  # how image_transport ends the names of such topics
 _ZSTD = b"\x28\xb5\x2f\xfd"  # RFC 8878, 3.1.1
 
@@ -155,12 +153,12 @@ class Bag:
             return "is not in this bag"
         if topic.messages == 0:
             return "holds no messages"
-        if topic.type not in (CLOUD, _IMAGE, _COMPRESSED):
+        if topic.type not in (CLOUD, IMAGE, COMPRESSED_IMAGE):
             return f"holds {_short(topic.type)} messages"
         if topic.type != CLOUD:
             try:
                 message = self._first(topic)
-                if topic.type == _IMAGE:
+                if topic.type == IMAGE:
                     check_encoding(message.encoding)
                 else:
                     check_compressed_format(message.format)
@@ -191,8 +189,7 @@ class Bag:
         cloud: Points | DoorstateError
         try:
             message = self._message(raw, message_type)
-            stamp = message.header.stamp
-            stamp_ns = stamp.sec * 10**9 + stamp.nanosec or log_ns
+            stamp_ns = stamp_ns_of(message) or log_ns
             frame_id = message.header.frame_id
             cloud = convert(message)
         except DoorstateError as error:
@@ -204,17 +201,14 @@ class Bag:
     def _converter(
         self, topic: BagTopic, options: ReadOptions, camera_info_topic: str | None
     ) -> Callable[[Any], Points]:
-        if topic.type == CLOUD:
-            return lambda message: _points_from_cloud(message, options)
-        if camera_info_topic is not None or options.intrinsics is None:
+        if topic.type != CLOUD and (camera_info_topic is not None or options.intrinsics is None):
             camera = self._camera(camera_info_topic or _camera_info_beside(topic.name))
             options = replace(options, intrinsics=camera)
-        return lambda message: _points_from_depth(message, topic.type, options)
+        return lambda message: points_from_message(message, topic.type, options)
 
     def _camera(self, name: str) -> Intrinsics:
-        """Camera of rectified images, as ROS' own depth_image_proc takes it: P, or K where P is not set."""
         topic = next(
-            (topic for topic in self.topics if (topic.name, topic.type) == (name, _CAMERA_INFO)), None
+            (topic for topic in self.topics if (topic.name, topic.type) == (name, CAMERA_INFO)), None
         )
         if topic is None or topic.messages == 0:
             raise CameraError(
@@ -222,35 +216,10 @@ class Bag:
                 "give --camera-info-topic, --intrinsics FILE or --fx --fy --cx --cy"
             )
         info = self._first(topic)
-        matrix, projection = (info.k, info.p) if hasattr(info, "k") else (info.K, info.P)  # ROS 2, ROS 1
-        fx, cx, fy, cy = projection[[0, 2, 5, 6]] if projection[0] else matrix[[0, 2, 4, 5]]
         try:
-            return Intrinsics(info.width, info.height, float(fx), float(fy), float(cx), float(cy))
+            return intrinsics_from_message(info)
         except CameraError as error:
             raise CameraError(f"{self._path.name}: {name}: {error}") from error
-
-
-def _points_from_cloud(message: Any, options: ReadOptions) -> Points:
-    points = points_from_pointcloud2(
-        message.height,
-        message.width,
-        message.fields,
-        message.is_bigendian,
-        message.point_step,
-        message.row_step,
-        message.data,
-    )
-    return points_in_body(points, options)
-
-
-def _points_from_depth(message: Any, message_type: str, options: ReadOptions) -> Points:
-    if message_type == _COMPRESSED:
-        pixels = pixels_from_compressed_depth(message.format, message.data)
-    else:
-        pixels = pixels_from_image(
-            message.height, message.width, message.encoding, message.is_bigendian, message.step, message.data
-        )
-    return points_from_depth(pixels, options)
 
 
 def _camera_info_beside(topic: str) -> str:

@@ -43,6 +43,11 @@ class Prediction:
     opening_angle_deg: float | None = None  # where the method tells it
     found: tuple[Shape, ...] = field(default=(), compare=False, repr=False)  # by a rule, on the way
 
+    @classmethod
+    def none(cls, reason: str) -> Prediction:
+        """Of a cloud that nobody could be asked about."""
+        return cls(None, dict.fromkeys(STATES, 0.0), 0, 0.0, reason)
+
 
 class Predictor:
     """A network with its weights, and the preparation they were trained with.

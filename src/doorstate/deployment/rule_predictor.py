@@ -29,13 +29,17 @@ class RulePredictor:
         self.gate = gate
 
     @classmethod
-    def load(cls, name: str) -> RulePredictor:
+    def load(cls, name: str, *, gate: Gate | None = DEFAULT_GATE) -> RulePredictor:
         """A rule by name, with its default parameters.
+
+        Args:
+            name: of `doorstate.rules.list_rules()`.
+            gate: as of the class.
 
         Raises:
             ConfigError: no such rule.
         """
-        return cls(create_rule(name))
+        return cls(create_rule(name), gate=gate)
 
     def __call__(self, points: Points) -> Prediction:
         """State of the door in a cloud, or none with the reason; a given state has probability 1.

@@ -104,6 +104,35 @@ class StateFilter:
         return Filtered(self._state, named, self._since_s)
 
 
+class Holding:
+    """For how long the filter and frame after frame have agreed on a state.
+
+    Args:
+        longest_gap_s: between frames with a state; after a longer one the holding begins anew. Chosen: at walking
+            pace a robot goes half a metre in it.
+    """
+
+    def __init__(self, longest_gap_s: float = 0.5) -> None:
+        self._longest_gap_s = longest_gap_s
+        self._seen_s = -math.inf  # the last frame with a state
+        self._unbroken_s = 0.0  # from then on frames with a state came without a gap
+
+    def update(self, prediction: Prediction, filtered: Filtered, stamp_s: float) -> float | None:
+        """Take in one frame and what the filter says after it.
+
+        Returns:
+            Seconds for which the filter's state has held, or None if this frame has another one or none.
+        """
+        if prediction.state is None:
+            return None
+        if not 0 <= stamp_s - self._seen_s <= self._longest_gap_s:
+            self._unbroken_s = stamp_s
+        self._seen_s = stamp_s
+        if filtered.state != prediction.state:
+            return None
+        return stamp_s - max(filtered.since_s, self._unbroken_s)
+
+
 def wait_for(
     state: DoorState | str,
     stream: Iterable[tuple[float, Points | Prediction]],
@@ -126,8 +155,7 @@ def wait_for(
         hold_s: how long the filtered state must have held.
         predictor: of clouds; the packaged weights if not given.
         state_filter: with other parameters than the default, or a past.
-        longest_gap_s: between frames with a state; after a longer one the holding begins anew. Chosen: at walking
-            pace a robot goes half a metre in it.
+        longest_gap_s: as of `Holding`.
 
     Raises:
         ConfigError: no such state, or a stamp that is not finite.
@@ -136,9 +164,8 @@ def wait_for(
     if not isinstance(wanted, DoorState):
         raise ConfigError(f"no state {state!r}: there are {', '.join(STATES)}")
     state_filter = state_filter or StateFilter()
+    holding = Holding(longest_gap_s)
     last_s: float | None = None
-    seen_s = -math.inf  # the last frame with a state
-    unbroken_s = 0.0  # from then on frames with a state came without a gap
     waited_s = 0.0
     for stamp_s, frame in stream:
         if isinstance(frame, Prediction):
@@ -151,13 +178,8 @@ def wait_for(
         last_s = stamp_s
         if waited_s > timeout_s:
             return False
-        if prediction.state is None:
-            continue
-        if not 0 <= stamp_s - seen_s <= longest_gap_s:
-            unbroken_s = stamp_s
-        seen_s = stamp_s
-        held_s = stamp_s - max(filtered.since_s, unbroken_s)
-        if filtered.state == prediction.state == wanted and held_s >= hold_s:
+        held_s = holding.update(prediction, filtered, stamp_s)
+        if prediction.state == wanted and held_s is not None and held_s >= hold_s:
             return True
     return False
 
@@ -166,4 +188,4 @@ def _prediction(predictor: Callable[[Points], Prediction], cloud: Points) -> Pre
     try:
         return predictor(cloud)
     except CloudContentError as error:
-        return Prediction(None, dict.fromkeys(STATES, 0.0), 0, 0.0, str(error))
+        return Prediction.none(str(error))

