@@ -98,7 +98,7 @@ def test_everything_is_written_self_contained_and_the_same_twice(
     assert samples == {ids[2], ids[7]}
     for table in ("summary", *(f"table{n}" for n in (1, 3)), "table4_closed", "table6_open", "runs"):
         assert any(target and target.startswith(table) for target in targets), table
-    assert page.classes().count("picture") == 5
+    assert page.classes().count("picture") == 6
     assert page.classes().count("confusion") == 2
     assert "Partial" not in page.text
 

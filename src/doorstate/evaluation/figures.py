@@ -18,6 +18,7 @@ from matplotlib.ticker import LogLocator, NullLocator
 from doorstate.dataset.store import PreparedDataset
 from doorstate.evaluation.calibration import reliability_figure
 from doorstate.evaluation.errors_figure import common_errors_figure, surest_errors_figure
+from doorstate.evaluation.factors import factors_figure
 from doorstate.evaluation.metrics import ratio, scores
 from doorstate.evaluation.plan_figures import error_map, poses_figure
 from doorstate.evaluation.results import ComparisonResults, Run
@@ -55,6 +56,7 @@ def draw_figures(results: ComparisonResults, dataset: PreparedDataset) -> dict[s
         "figure3_misclassified": surest_errors_figure(results, dataset),
         "figure4_missed_by_most": common_errors_figure(results, dataset),
         "errors_in_plan": error_map(results, dataset),
+        "factors": factors_figure(results, dataset),
     }
     return encode_figures(figures)
 

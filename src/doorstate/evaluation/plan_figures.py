@@ -20,6 +20,7 @@ from doorstate.evaluation.metrics import Floats
 from doorstate.evaluation.results import ComparisonResults
 from doorstate.evaluation.stratum_tables import is_undecidable
 from doorstate.evaluation.views import REGION_COLORS, STATE_COLORS
+from doorstate.simulation.generate import SampleRow
 from doorstate.simulation.manifest import unflatten
 from doorstate.simulation.scene import Door, build_scene
 from doorstate.types import STATES, Part
@@ -111,8 +112,8 @@ def error_map(results: ComparisonResults, dataset: PreparedDataset) -> Figure | 
 
 def _door_of(dataset: PreparedDataset) -> Door:
     """The door of a simulated data set; of another, a sketch with the simulator's sizes."""
-    row = dataset.rows[0]
-    return unflatten(row).door if "door.hinge" in row else Door()
+    row = unflatten(dataset.rows[0]) if "door.hinge" in dataset.rows[0] else None
+    return row.door if isinstance(row, SampleRow) else Door()
 
 
 def _posed_rows(dataset: PreparedDataset) -> list[dict[str, str]]:

@@ -9,6 +9,7 @@ from pathlib import Path
 from doorstate.dataset.store import PreparedDataset
 from doorstate.evaluation.calibration import calibration_table
 from doorstate.evaluation.error_kinds import error_kinds_table
+from doorstate.evaluation.factors import factors_table
 from doorstate.evaluation.metrics import confusion_matrix, scores
 from doorstate.evaluation.results import ComparisonResults
 from doorstate.evaluation.rule_tables import angle_table, reasons_table
@@ -56,14 +57,20 @@ def build_tables(results: ComparisonResults, dataset: PreparedDataset) -> dict[s
         "calibration": calibration_table(results),
         "undecidable_accuracy": decidable_table(results, dataset),
         "runs": runs_table(results),
-        **_filled({"angle_errors": angle_table(results, dataset), "reasons": reasons_table(results)}),
+        **_filled(
+            {
+                "angle_errors": angle_table(results, dataset),
+                "reasons": reasons_table(results),
+                "factors": factors_table(results, dataset),
+            }
+        ),
         "error_kinds": error_kinds_table(results, dataset),
         "misclassified": misclassified_table(results, dataset),
     }
 
 
 def _filled(tables: Mapping[str, Table]) -> dict[str, Table]:
-    """Leave out the tables of what only rules say, where there is none."""
+    """Leave out the tables of what only rules or only the simulator know, where there is none."""
     return {name: table for name, table in tables.items() if table.rows}
 
 
