@@ -1,4 +1,5 @@
 # make setup: everything into .venv; make demo: the whole pipeline, small; make check, make test: before you commit.
+# make docs: the site, in build/site; make fresh-install: the wheel as a new user gets it, timed.
 # make reproduce: the paper's comparison from nothing (EXPERIMENT=by-pose, authors, resolution, weights: those);
 # make reproduce-check: are all published tables and figures what the committed predictions give?
 VENV := .venv
@@ -7,7 +8,7 @@ DEMO := demo
 
 EXPERIMENT := paper
 
-.PHONY: setup check test demo reproduce reproduce-check lock clean
+.PHONY: setup check test docs demo fresh-install reproduce reproduce-check lock clean
 
 setup: $(VENV)/.complete
 
@@ -16,13 +17,20 @@ $(VENV)/.complete: tools/setup.sh requirements.lock pyproject.toml
 	touch $@
 
 check: setup
-	$(BIN)/ruff check src tests tools benchmarks
-	$(BIN)/ruff format --check src tests tools benchmarks
+	$(BIN)/ruff check src tests tools benchmarks examples docs/conf.py
+	$(BIN)/ruff format --check src tests tools benchmarks examples docs/conf.py
 	$(BIN)/mypy
 	$(BIN)/python tools/check_imports.py
 
 test: setup check
 	$(BIN)/python -m pytest -n auto
+
+docs: setup
+	$(BIN)/python -m sphinx --quiet --builder html --fail-on-warning --keep-going --nitpicky docs build/site
+	@echo "open build/site/index.html"
+
+fresh-install: setup
+	$(BIN)/python tools/fresh_install.py
 
 demo: setup
 	$(BIN)/python tools/demo.py $(DEMO)

@@ -15,6 +15,7 @@ from statistics import median
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from results_page import NAMES
+from zoo_page import PAGE, page
 
 from doorstate.evaluation.calibration import calibrate, reliability
 from doorstate.evaluation.metrics import scores
@@ -70,6 +71,7 @@ def main(folder: str) -> None:
         )
         write_text(target.with_suffix(".md"), text)
         print(f"{target}: {target.stat().st_size / 1e6:.1f} MB")
+    write_text(PAGE, page())
     total = sum(path.stat().st_size for path in WEIGHTS.glob("*.safetensors"))
     print(f"together {total / 1e6:.1f} MB")
     if total > _MANY:
