@@ -31,7 +31,6 @@ autodoc_default_options = {
     "members": True,
     "special-members": "__call__",
     "exclude-members": "model_config",
-    "show-inheritance": True,
 }
 autodoc_inherit_docstrings = False
 autodoc_member_order = "bysource"
@@ -72,11 +71,12 @@ def _read(app: Sphinx, page: str, source: list[str]) -> None:
 def _contents(index: str) -> str:
     """The side bar: a section of the index is a group, a list item that begins with a link is a page."""
     groups = re.split(r"^## (.+)\n", index, flags=re.MULTILINE)[1:]
-    return "".join(
-        "\n".join(["", "```{toctree}", ":hidden:", f":caption: {title}", "", *pages, "```", ""])
-        for title, body in zip(groups[::2], groups[1::2], strict=True)
-        if (pages := re.findall(r"^- \[[^\]]+\]\(([^)]+)\.md\)", body, flags=re.MULTILINE))
-    )
+    trees = []
+    for title, body in zip(groups[::2], groups[1::2], strict=True):
+        pages = re.findall(r"^- \[([^\]]+)\]\(([^)]+)\.md\)", body, flags=re.MULTILINE)
+        entries = [f"{text} <{page}>" for text, page in pages]
+        trees += ["", "```{toctree}", ":hidden:", f":caption: {title}", "", *entries, "```"]
+    return "\n".join([*trees, ""])
 
 
 def _help_of_commands() -> list[str]:
