@@ -132,6 +132,23 @@ def latency(
 
 
 @app.command()
+def rules(
+    out: Out,
+    count: Annotated[int, typer.Option(help="Clouds, of all states.", min=1)] = 60,
+    points: Annotated[int, typer.Option(help="Points that networks look at.", min=128)] = 4096,
+    repeats: Repeats = 3,
+    threads: Threads = 1,
+) -> None:
+    """From a raw 640 x 480 cloud in memory to a state by rules, and by two networks beside them."""
+    from benchmarks.rules import measure, rules_table
+    from doorstate.console import progress_bar
+
+    with progress_bar("rules") as progress:
+        rows = measure(count, points, threads, repeats, progress)
+    _finish(out, "rules", rows, rules_table(rows), clouds=count, threads=threads, repeats=repeats)
+
+
+@app.command()
 def profile(
     out: Out,
     networks: Networks = "all",

@@ -15,7 +15,7 @@ from doorstate.dataset.splits import draw_splits
 from doorstate.dataset.store import PreparedDataset, open_dataset
 from doorstate.errors import ConfigError
 from doorstate.jobs import Progress
-from doorstate.simulation.generate import PRESETS, Frame, draw_pose, pose_indices, replay
+from doorstate.simulation.generate import PRESETS, Frame, SampleRow, draw_pose, pose_indices, replay
 from doorstate.simulation.manifest import unflatten
 from doorstate.types import STATES, Points
 
@@ -39,14 +39,23 @@ def raw_cloud() -> Points:
     return replay(draw_pose(_PRESET, _SEED, pose_indices(3)[1])[1]).points
 
 
+def raw_clouds(count: int) -> list[Points]:
+    """As `raw_cloud`, of doors in all three states, poses spread over the room."""
+    return [replay(row).points for row in _doors(count)]
+
+
+def _doors(count: int) -> list[SampleRow]:
+    poses = pose_indices(max(3, -(-count // len(STATES))))
+    return [row for pose in poses for row in draw_pose(_PRESET, _SEED, pose)][:count]
+
+
 def simulated_clouds(count: int, num_points: int) -> Clouds:
     """Render and prepare doors in all three states, poses spread over the room.
 
     Raises:
         ConfigError: more points are asked for than a cloud has.
     """
-    poses = pose_indices(max(3, -(-count // len(STATES))))
-    rows = [row for pose in poses for row in draw_pose(_PRESET, _SEED, pose)][:count]
+    rows = _doors(count)
     clouds = [prepare_cloud(replay(row).points, num_points).points for row in rows]
     fewest = min(map(len, clouds))
     if fewest < num_points:

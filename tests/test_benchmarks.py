@@ -25,6 +25,7 @@ from doorstate.dataset.store import PreparedDataset
 from doorstate.deployment.predictor import Prediction
 from doorstate.errors import ConfigError, RunError
 from doorstate.jobs import no_progress
+from doorstate.rules import list_rules
 from doorstate.types import DoorState
 
 REPOSITORY = Path(__file__).resolve().parents[1]
@@ -162,6 +163,16 @@ def test_latency_is_the_sum_of_its_stages(tmp_path: Path) -> None:
         assert all(spent > 0 for spent in stages.values())
         assert sum(stages.values()) == pytest.approx(total)
         assert f"| {row['network']} | {row['runtime']} | 128 | 1 |" in markdown
+
+
+def test_rules_are_timed_beside_networks(tmp_path: Path) -> None:
+    few = ("--count", "2", "--points", "128", "--repeats", "1")
+    assert run("rules", "--out", tmp_path, *few)[0] == 0
+    _, rows, markdown = stored(tmp_path, "rules")
+    assert [row["method"] for row in rows] == [*list_rules(), "mvcnn", "pointnet2"]
+    for row in rows:
+        assert 0 < row["median_ms"] <= row["p90_ms"] <= row["most_ms"]
+        assert f"| {row['method']} | {row['points'] or 'all'} |" in markdown
 
 
 def test_profile_has_a_row_per_group_of_operators(tmp_path: Path) -> None:

@@ -22,7 +22,8 @@ REPOSITORY = Path(__file__).resolve().parents[1]
 RESULTS, RUNS, EXPERIMENTS = REPOSITORY / "results", REPOSITORY / "runs", REPOSITORY / "experiments"
 ROWS = RESULTS / "ogurob-4096"  # the data set without its clouds, which are replayed from the rows
 DOORSTATE = Path(sys.executable).with_name("doorstate")
-PAGE = Path("docs") / "results.md"
+PAGES = (Path("docs") / "results.md", Path("docs") / "related.md")
+BESIDE = {"related": "paper"}  # is shown beside the methods of another comparison
 
 # What `publish` leaves behind: large, or of use only to a running training.
 _NOT_PUBLISHED = ("*.safetensors", "*.pt", "position.txt", "report")
@@ -109,16 +110,16 @@ def again(network: str, fold: int, name: str = "paper") -> str | None:
 
 def build(root: Path) -> None:
     """Write everything that follows from the committed predictions below `root`."""
-    from results_page import write_page
+    from results_page import write_pages
 
     from doorstate.evaluation.report import write_everything
     from doorstate.evaluation.resolution import write_resolution
 
-    for folder, folds in _comparisons():
-        write_everything([folder], root / "results" / folder.name / "report", ROWS, folds)
+    for folders, folds in _comparisons():
+        write_everything(folders, root / "results" / folders[-1].name / "report", ROWS, folds)
     if (RESULTS / "resolution").is_dir():
         write_resolution(RESULTS / "resolution", root / "results" / "resolution" / "report", ROWS)
-    write_page(RESULTS, ROWS, root / "results", root / PAGE)
+    write_pages(RESULTS, ROWS, root / "results", *(root / page for page in PAGES))
 
 
 def check() -> str | None:
@@ -132,7 +133,7 @@ def check() -> str | None:
             for folder in RESULTS.glob("*/report")
             for path in folder.rglob("*")
             if path.is_file()
-        } | {PAGE}
+        } | {page for page in PAGES if (REPOSITORY / page).is_file()}
         lines = [f"{path}: not made any more" for path in sorted(committed - made)]
         for path in sorted(made):
             published = REPOSITORY / path
@@ -146,13 +147,15 @@ def check() -> str | None:
     return None
 
 
-def _comparisons() -> Iterator[tuple[Path, int]]:
-    """Folders of published comparisons, and how many of their folds all methods have finished; at least one."""
+def _comparisons() -> Iterator[tuple[list[Path], int]]:
+    """Published comparisons, those shown as one together, and how many folds all methods have finished; at least one."""
     from results_page import whole_folds
 
     for path in sorted(RESULTS.glob("*/comparison.json")):
-        if folds := whole_folds(path.parent):
-            yield path.parent, folds
+        beside = BESIDE.get(path.parent.name)
+        folders = [*([RESULTS / beside] if beside else []), path.parent]
+        if folds := min(whole_folds(folder) for folder in folders):
+            yield folders, folds
 
 
 def _doorstate(arguments: str) -> None:

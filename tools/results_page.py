@@ -1,20 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
-"""docs/results.md from the committed predictions: the words are in results.md.j2, every figure is computed."""
+"""docs/results.md and docs/related.md from the committed predictions: words are in the .j2, figures are computed."""
 
 from __future__ import annotations
 
 import json
 import re
 from collections import defaultdict
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
+from doorstate.evaluation.join import load_joined
 from doorstate.evaluation.metrics import Scores, scores
 from doorstate.evaluation.resolution import load_resolution, resolution_table
-from doorstate.evaluation.results import ComparisonResults, load_results
+from doorstate.evaluation.results import ComparisonResults
 from doorstate.evaluation.score_tables import pooled_confusion
 from doorstate.evaluation.table import UNDEFINED, Table, number
 from doorstate.files import write_text
@@ -29,6 +32,12 @@ NAMES = {
     "dgcnn": "DGCNN",
     "pointcnn": "PointCNN",
     "point2sequence": "Point2Sequence",
+    "mvcnn": "MVCNN",
+    "open_door": "open-door rule",
+    "plane_state": "plane state",
+    "wall_leaf_angle": "wall and leaf",
+    "angle_bins": "angle bins",
+    "depth_region": "depth region",
 }
 
 
@@ -67,23 +76,42 @@ class Published:
         return int(row[STATES.index(state)]), int(row.sum())
 
 
-def write_page(results_folder: Path, rows_folder: Path, reports_folder: Path, page: Path) -> None:
-    """Render the page.
+def write_pages(
+    results_folder: Path, rows_folder: Path, reports_folder: Path, results_page: Path, related_page: Path
+) -> None:
+    """Render both pages; that of the related work once it is published beside the paper's networks.
 
     Args:
         results_folder: holds one folder for each published experiment.
         rows_folder: the data set, rows alone.
         reports_folder: holds `<experiment>/report` of each complete one, made before.
-        page: the file to write.
+        results_page: of the five networks.
+        related_page: of the methods beside them.
     """
     folders = [path.parent for path in sorted(results_folder.glob("*/comparison.json"))]
     waiting = {folder.name: unfinished_runs(folder) for folder in folders}
     published = {
-        folder.name: _published(folder, rows_folder, reports_folder)
+        folder.name: _published([folder], rows_folder, reports_folder)
         for folder in folders
         if whole_folds(folder)
     }
     resolution = results_folder / "resolution"
+    _render(
+        "results.md.j2",
+        results_page,
+        published=published,
+        waiting={name: runs for name, runs in waiting.items() if runs},
+        budget=_table(budget_table(list(published.values()))),
+        resolution=_table(resolution_table(load_resolution(resolution, rows_folder)))
+        if resolution.is_dir()
+        else None,
+    )
+    if "paper" in published and "related" in published:
+        both = [results_folder / name for name in ("paper", "related")]
+        _render("related.md.j2", related_page, all=_published(both, rows_folder, reports_folder))
+
+
+def _render(template: str, page: Path, **content: Any) -> None:
     environment = Environment(
         loader=FileSystemLoader(Path(__file__).parent),
         undefined=StrictUndefined,
@@ -91,15 +119,10 @@ def write_page(results_folder: Path, rows_folder: Path, reports_folder: Path, pa
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    text = environment.get_template("results.md.j2").render(
-        published=published,
-        waiting={name: runs for name, runs in waiting.items() if runs},
+    text = environment.get_template(template).render(
+        **content,
         names=NAMES,
         states=STATES,
-        budget=_table(budget_table(list(published.values()))),
-        resolution=_table(resolution_table(load_resolution(resolution, rows_folder)))
-        if resolution.is_dir()
-        else None,
         percent=lambda value, digits=2: f"{100 * value:.{digits}f} %",
     )
     write_text(page, re.sub(r"\n{3,}", "\n\n", text).strip() + "\n")
@@ -137,6 +160,8 @@ def budget_table(published: list[Published]) -> Table:
             clouds = epochs * run.metric("train_samples")
             costs[run.network].append((run.metric("seconds"), threads, epochs, clouds))
         for network, runs in costs.items():
+            if not any(epochs for _, _, epochs, _ in runs):
+                continue  # a rule learns nothing
             seconds, threads, epochs, clouds = (sum(column) for column in zip(*runs, strict=True))
             port = clouds * port_ms[network] / 3.6e6 if network in port_ms else float("nan")
             core_hours = sum(run[0] * run[1] for run in runs) / 3600
@@ -159,9 +184,9 @@ def budget_table(published: list[Published]) -> Table:
     return Table("What the runs cost", columns, tuple(rows), note, text_columns=2)
 
 
-def _published(folder: Path, rows_folder: Path, reports_folder: Path) -> Published:
-    results = load_results(folder, rows_folder, whole_folds(folder))
-    tables = reports_folder / folder.name / "report" / "tables"
+def _published(folders: Sequence[Path], rows_folder: Path, reports_folder: Path) -> Published:
+    results = load_joined(folders, rows_folder, min(whole_folds(folder) for folder in folders))
+    tables = reports_folder / folders[-1].name / "report" / "tables"
     confusion = {network: pooled_confusion(results, network) for network in results.networks}
     return Published(
         results,
