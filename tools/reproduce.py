@@ -148,7 +148,7 @@ def check() -> str | None:
 
 
 def _comparisons() -> Iterator[tuple[list[Path], int]]:
-    """Published comparisons, those shown as one together, and how many folds all methods have finished; at least one."""
+    """Published comparisons, those shown as one together, and how many folds all have finished; at least one."""
     from results_page import whole_folds
 
     for path in sorted(RESULTS.glob("*/comparison.json")):
