@@ -103,6 +103,9 @@ _COLON = "\N{INFORMATION SEPARATOR ONE}"
 
 def _docstring(app: Sphinx, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:
     """Before napoleon: Markdown's code and bars as reStructuredText has them, and prose that is no type."""
+    if any("├──" in line for line in lines):  # a tree is drawn below the first sentence
+        lines[2:] = ["::", "", *(f"   {line}" for line in lines[2:])]
+        return
     returns = False
     for number, line in enumerate(lines):
         returns = line.strip() == "Returns:" or (returns and line[:1] in ("", " "))

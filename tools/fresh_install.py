@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A new user's path, timed: build the wheel, install it into an empty environment, ask for the state of one PCD.
+
+python tools/fresh_install.py     # needs the network; `make fresh-install`
+
+Torch is held to the version of requirements.lock, and nothing else is: that is what a user gets.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tempfile
+import time
+import venv
+from collections.abc import Sequence
+from pathlib import Path
+
+from doorstate.clouds.pcd import write_pcd
+from doorstate.simulation.generate import PRESETS, simulate_pose
+from doorstate.types import STATES
+
+REPOSITORY = Path(__file__).resolve().parents[1]
+
+
+def main() -> None:
+    """Build, install, ask; the environment is gone afterwards."""
+    with tempfile.TemporaryDirectory(prefix="doorstate-") as name:
+        folder = Path(name)
+        _, _ = _timed([sys.executable, "-m", "build", "--outdir", folder, REPOSITORY])
+        (wheel,) = folder.glob("*.whl")
+        venv.create(folder / "venv", with_pip=True)
+        binaries = folder / "venv" / "bin"
+        constraint = folder / "constraint.txt"
+        lock = (REPOSITORY / "requirements.lock").read_text(encoding="utf-8")
+        constraint.write_text(next(line for line in lock.splitlines() if line.startswith("torch==")))
+        pip = [binaries / "python", "-m", "pip", "install", "--quiet", "--constraint", constraint]
+        _, seconds = _timed([*pip, wheel])
+        print(f"pip install {wheel.name}: {seconds:.0f} s")
+
+        _, frames = simulate_pose(PRESETS["ogurob"], seed=3, index=360)
+        clouds = {state: folder / f"{state}.pcd" for state in STATES}
+        for path, frame in zip(clouds.values(), frames, strict=True):
+            write_pcd(path, frame.points)
+        listed, _ = _timed([binaries / "doorstate", "info", "--json"])
+        packaged = [each["network"] for each in json.loads(listed)["networks"] if each["packaged_weights"]]
+        for options in (["--rule", "plane_state"], *(["--network", network] for network in packaged)):
+            for state, path in clouds.items():
+                said, seconds = _timed([binaries / "doorstate", "predict", path, *options, "--json"])
+                answer = json.loads(said)["state"]
+                print(f"doorstate predict {path.name} {' '.join(options)}: {answer}, {seconds:.1f} s")
+                if answer != state:
+                    sys.exit(f"fresh_install: {path.name} is {state}, and the answer was {answer}")
+
+
+def _timed(command: Sequence[str | Path]) -> tuple[str, float]:
+    """Standard output and seconds; its error ends everything."""
+    started = time.perf_counter()
+    # Outside the repository, so that nothing of it can be imported.
+    finished = subprocess.run(command, cwd=tempfile.gettempdir(), capture_output=True, text=True, check=False)
+    if finished.returncode:
+        sys.exit(f"fresh_install: {' '.join(map(str, command))}\n{finished.stdout}{finished.stderr}")
+    return finished.stdout, time.perf_counter() - started
+
+
+if __name__ == "__main__":
+    main()
