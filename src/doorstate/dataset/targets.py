@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the manifest knows of a door, in the units and axes that a network sees; NaN where it does not know.
+
+The same four answers as `networks.heads`: opening angle, hinge side, frame pose, widths.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from doorstate.clouds.augment import AugmentationDraw
+from doorstate.clouds.preparation import SCALE_M
+from doorstate.types import Points
+
+Targets = dict[str, NDArray[np.float32]]
+"""By answer: "angle" (M, 1) radians, "hinge" (M, 1) 1 left and 0 right, "frame" (M, 3), "widths" (M, 2)."""
+
+_HINGE = {"left": 1.0, "right": 0.0}
+
+
+def door_targets(rows: Sequence[Mapping[str, str]], centroids: Points) -> Targets:
+    """Targets of samples whose clouds were centred on (M, 3) centroids, in metres, and divided by 3 m.
+
+    A frame's yaw is that of its outward normal, which points to the robot's side of the wall.
+    """
+    angle = np.radians(_column(rows, "opening_angle_deg"))
+    hinge = [_HINGE.get(row.get("hinge") or row.get("door.hinge", ""), math.nan) for row in rows]
+    normal = np.radians(_column(rows, "door_yaw_deg") + 90)
+    place = np.stack([_column(rows, name) for name in ("door_x_m", "door_y_m")], axis=1) - centroids[:, :2]
+    widths = np.stack(
+        [
+            _column(rows, "opening_width_m", "door.opening_width_m"),
+            _column(rows, "passable_width_m"),
+        ],
+        axis=1,
+    )
+    found = {
+        "angle": angle[:, None],
+        "hinge": np.array(hinge)[:, None],
+        "frame": np.column_stack([place / SCALE_M, np.arctan2(np.sin(normal), np.cos(normal))]),
+        "widths": widths / SCALE_M,
+    }
+    return {name: values.astype(np.float32) for name, values in found.items()}
+
+
+def augmented(targets: Targets, draw: AugmentationDraw) -> Targets:
+    """Targets of clouds that were changed by a draw: turned, mirrored, scaled and moved with them."""
+    plan = draw.linear[:, :2, :2].astype(
+        np.float64
+    )  # a tilt of a few degrees moves a door by less than its leaf
+    determinant = np.linalg.det(plan)
+    scale = np.sqrt(np.abs(determinant))[:, None]
+    frame = targets["frame"]
+    normal = np.stack([np.cos(frame[:, 2]), np.sin(frame[:, 2])], axis=1)
+    place, normal = ((plan @ vector[:, :, None])[:, :, 0] for vector in (frame[:, :2], normal))
+    changed = {
+        "angle": targets["angle"],
+        "hinge": np.where(determinant[:, None] < 0, 1 - targets["hinge"], targets["hinge"]),
+        "frame": np.column_stack([place + draw.shift[:, 0, :2], np.arctan2(normal[:, 1], normal[:, 0])]),
+        "widths": targets["widths"] * scale,
+    }
+    return {name: values.astype(np.float32) for name, values in changed.items()}
+
+
+def _column(rows: Sequence[Mapping[str, str]], *names: str) -> NDArray[np.float64]:
+    """(M,) numbers under the first of the names that a row has, NaN where it has none."""
+    return np.array([float(next((row[name] for name in names if row.get(name)), math.nan)) for row in rows])
