@@ -26,7 +26,7 @@ test: setup check
 	$(BIN)/python -m pytest -n auto
 
 docs: setup
-	$(BIN)/python -m sphinx --quiet --builder html --fail-on-warning --keep-going --nitpicky docs build/site
+	$(BIN)/python -m sphinx --quiet --builder html --fresh-env --fail-on-warning --keep-going --nitpicky docs build/site
 	@echo "open build/site/index.html"
 
 fresh-install: setup
