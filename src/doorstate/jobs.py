@@ -5,17 +5,44 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import re
 import signal
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from multiprocessing.synchronize import Event
 from pathlib import Path
-from typing import TypeVar
+from typing import NamedTuple, Self, TypeVar
+
+from doorstate.errors import ConfigError
 
 Piece = TypeVar("Piece")
 Progress = Callable[[int, int], None]  # (pieces done, pieces in all)
 _LOOK_EVERY_S = 0.2
+
+
+class Shard(NamedTuple):
+    """One of so many equal shares of a job's pieces; `number` counts from 1."""
+
+    number: int
+    shards: int
+
+    @classmethod
+    def parse(cls, text: str) -> Self:
+        """Read `2/8`.
+
+        Raises:
+            ConfigError: it is not of that form, or there is no such share.
+        """
+        match = re.fullmatch(r"([0-9]{1,6})/([0-9]{1,6})", text)
+        shard = cls(*(int(digits) for digits in match.groups())) if match else cls(0, 0)
+        if not 1 <= shard.number <= shard.shards:
+            raise ConfigError(f"--shard {text}: give the share and how many there are, such as 2/8")
+        return shard
+
+    def of(self, pieces: Sequence[Piece]) -> Sequence[Piece]:
+        """Every so-many-th piece, so that all shares take about as long."""
+        return pieces[self.number - 1 :: self.shards]
 
 
 def no_progress(done: int, total: int) -> None:

@@ -8,6 +8,7 @@ metres.
 from __future__ import annotations
 
 from enum import IntEnum
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,7 @@ class DoorState(IntEnum):
 
 
 STATES: tuple[str, ...] = tuple(state.label for state in DoorState)
+NO_DOOR: Final = "no_door"  # of a scene without one, as an example of what no state is; no class of the networks
 NO_ANSWER = "no_answer"  # of a method that says so rather than guess
 ANSWERS: tuple[str, ...] = (*STATES, NO_ANSWER)
 

@@ -28,6 +28,9 @@ def turn_z(vector: Vector, angle_rad: float) -> Vector:
 def pixel_ray(row: int, column: int, pose: CameraPose, camera: Intrinsics) -> Vector:
     """Direction in the door frame with a forward part of one, so that its length counts z-depth."""
     left, up = (camera.cx - column) / camera.fx, (camera.cy - row) / camera.fy
+    # Roll turns about x: a camera turned clockwise sees at its left what is above.
+    cos, sin = math.cos(pose.roll_rad), math.sin(pose.roll_rad)
+    left, up = left * cos - up * sin, left * sin + up * cos
     cos, sin = math.cos(pose.pitch_rad), math.sin(pose.pitch_rad)
     # Pitch turns about y, and a positive one looks down.
     return turn_z((cos + up * sin, left, up * cos - sin), pose.yaw_rad)

@@ -116,7 +116,7 @@ _LIMITS = np.array(
 @settings(deadline=None, max_examples=50)
 def test_only_what_lies_strictly_within_the_range_is_measured(depth: np.ndarray) -> None:
     parts = np.arange(5, dtype=np.uint8)
-    cut = cut_range(Render(depth[None], parts[None]), DepthCamera())
+    cut = cut_range(Render(depth[None], parts[None], parts[None].astype(np.int16)), DepthCamera())
     for before, after, part, number in zip(depth, cut.depth_m[0], cut.part[0], range(5), strict=True):
         if np.float32(0.4) < before < np.float32(5.0):
             assert (after, part) == (before, number)

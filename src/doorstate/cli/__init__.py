@@ -18,6 +18,7 @@ from doorstate.cli.resolution import resolution
 from doorstate.cli.service import serve
 from doorstate.cli.training import compare, report, train
 from doorstate.cli.viewing import view
+from doorstate.cli.worlds import export_sdf
 from doorstate.errors import DoorstateError
 
 app = typer.Typer(
@@ -29,7 +30,20 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
 )
-for command in (simulate, prepare, train, compare, report, resolution, predict, view, serve, export, info):
+for command in (
+    simulate,
+    prepare,
+    train,
+    compare,
+    report,
+    resolution,
+    predict,
+    view,
+    serve,
+    export,
+    export_sdf,
+    info,
+):
     app.command()(command)
 
 

@@ -14,6 +14,7 @@ from doorstate.clouds.augment import Augmentation, AugmentationDraw, apply_augme
 from doorstate.clouds.preparation import normalize
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import ConfigError
+from doorstate.types import DoorState
 
 FindNeighbours = Callable[[Tensor], tuple[Tensor, ...]]
 """From (B, n, 3) points to (B, ...) int64 indices into them."""
@@ -47,7 +48,7 @@ class CloudLoader:
                 augmentations that leave its result as it is.
 
         Raises:
-            ConfigError: more points are asked for than the data set holds.
+            ConfigError: more points are asked for than the data set holds, or a sample shows no door.
         """
         if num_points > dataset.num_points:
             raise ConfigError(
@@ -58,6 +59,12 @@ class CloudLoader:
         # A prefix of a farthest-point order is the farthest-point sample of that size.
         self._points = normalize(dataset.clouds[indices, :num_points])
         self._labels = dataset.labels[indices]
+        without = np.flatnonzero(self._labels >= len(DoorState))
+        if len(without):
+            raise ConfigError(
+                f"{dataset.folder}: {len(without)} samples show no door, such as {sample_ids[without[0]]}; "
+                "a network of three states can learn nothing from them: take a data set without them"
+            )
         self._neighbours = (
             None if find_neighbours is None else _KnownNeighbours(find_neighbours, self._points)
         )

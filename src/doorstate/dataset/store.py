@@ -20,9 +20,10 @@ from doorstate.files import write_text
 from doorstate.simulation.generate import replay
 from doorstate.simulation.manifest import read_csv, unflatten
 from doorstate.simulation.shading import shade
-from doorstate.types import STATES, Points
+from doorstate.types import NO_DOOR, STATES, Points
 
 MANIFEST, CLOUDS, PARTS, DESCRIPTION = "manifest.csv", "clouds.npy", "parts.npy", "dataset.json"
+_LABELS = (*STATES, NO_DOOR)
 
 
 class DatasetDescription(BaseModel):
@@ -86,8 +87,8 @@ class PreparedDataset:
 
     @cached_property
     def labels(self) -> NDArray[np.int64]:
-        """(M,) class labels, doorstate.types.DoorState."""
-        return np.array([STATES.index(row["state"]) for row in self.rows], dtype=np.int64)
+        """(M,) class labels, doorstate.types.DoorState; 3 of a scene without a door."""
+        return np.array([_LABELS.index(row["state"]) for row in self.rows], dtype=np.int64)
 
     @cached_property
     def _index(self) -> dict[str, int]:
@@ -172,9 +173,9 @@ def open_dataset(folder: Path) -> PreparedDataset:
     for column in ("sample_id", "state"):
         if rows and column not in rows[0]:
             raise DatasetError(f"{folder / MANIFEST}: has no column {column!r}")
-    unknown = {row["state"] for row in rows} - set(STATES)
+    unknown = {row["state"] for row in rows} - set(_LABELS)
     if unknown:
         raise DatasetError(
-            f"{folder / MANIFEST}: unknown state {sorted(unknown)[0]!r}, use {', '.join(STATES)}"
+            f"{folder / MANIFEST}: unknown state {sorted(unknown)[0]!r}, use {', '.join(_LABELS)}"
         )
     return PreparedDataset(folder, description, rows, clouds, parts)

@@ -1,24 +1,24 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From a seed to manifest rows, and from a row back to its frame, bit for bit."""
+"""The paper's presets: from a seed to manifest rows of one door, seen from a half-ring of poses."""
 
 from __future__ import annotations
 
 import hashlib
 import math
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from doorstate.clouds.depth import depth_to_points
 from doorstate.errors import ConfigError
+from doorstate.simulation.frames import Frame as Frame
+from doorstate.simulation.frames import level as level
+from doorstate.simulation.frames import looks_into, opening_depth_m, same_image
+from doorstate.simulation.frames import replay as replay
 from doorstate.simulation.placement import draw_heading_rad, half_ring, reduced_ring
-from doorstate.simulation.scene import Door, build_scene
-from doorstate.simulation.sensor import CameraPose, DepthCamera, Render, cut_range, render
-from doorstate.types import DoorState, Part, Points
-
-_SAME_IMAGE_M = 1e-4
+from doorstate.simulation.scene import Box, Door, build_scene
+from doorstate.simulation.sensor import CameraPose, DepthCamera
+from doorstate.types import DoorState, Part
 
 
 class Preset(BaseModel):
@@ -89,13 +89,14 @@ class SampleRow(BaseModel):
     same_image_as: str = ""
     depth_sha256: str = ""
 
+    def camera_pose(self) -> CameraPose:
+        """The camera in the door frame."""
+        at_m = self.x_m, self.y_m, self.camera_height_m
+        return CameraPose.of_degrees(at_m, self.heading_deg, self.pitch_deg)
 
-class Frame(NamedTuple):
-    """A replayed sample."""
-
-    full: Render  # before the range cut: what a colour camera would see
-    cut: Render  # what the depth camera reports
-    points: Points  # (H, W, 3) metres, gravity-aligned sensor frame
+    def boxes(self) -> list[Box]:
+        """What the camera looks at."""
+        return build_scene(self.door, math.radians(self.opening_angle_deg))
 
 
 def draw_pose(preset: Preset, seed: int, index: int) -> list[SampleRow]:
@@ -137,37 +138,18 @@ def draw_pose(preset: Preset, seed: int, index: int) -> list[SampleRow]:
     return rows
 
 
-def replay(row: SampleRow) -> Frame:
-    """Rebuild the frame of a manifest row, bit for bit."""
-    pose = CameraPose(
-        row.x_m, row.y_m, row.camera_height_m, math.radians(row.heading_deg), math.radians(row.pitch_deg)
-    )
-    intrinsics = row.camera.intrinsics()
-    full = render(build_scene(row.door, math.radians(row.opening_angle_deg)), pose, intrinsics)
-    cut = cut_range(full, row.camera)
-    points = depth_to_points(cut.depth_m, intrinsics)
-    return Frame(full, cut, level(points, pose.pitch_rad))
-
-
-def level(points: Points, pitch_rad: float) -> Points:
-    """Turn points of a pitched camera (positive looks down) back to a level sensor frame; (..., 3) metres."""
-    if not pitch_rad:
-        return points
-    cos, sin = math.cos(pitch_rad), math.sin(pitch_rad)
-    x, y, z = points[..., 0], points[..., 1], points[..., 2]
-    return np.stack([cos * x + sin * z, y, cos * z - sin * x], axis=-1).astype(np.float32)
-
-
 def simulate_pose(preset: Preset, seed: int, index: int) -> tuple[list[SampleRow], list[Frame]]:
     """Draw and render the three samples of one pose and fill in what can be seen of the door."""
     rows = draw_pose(preset, seed, index)
     frames = [replay(row) for row in rows]
+    size = preset.door.opening_width_m, preset.door.opening_height_m
+    opening_m = opening_depth_m(rows[0].camera_pose(), preset.camera.intrinsics(), *size)
     filled = []
     for row, frame in zip(rows, frames, strict=True):
         twins = [
             other.state
             for other, other_frame in zip(rows, frames, strict=True)
-            if other.state != row.state and _same_image(frame.cut.depth_m, other_frame.cut.depth_m)
+            if other.state != row.state and same_image(frame.cut.depth_m, other_frame.cut.depth_m)
         ]
         part = frame.cut.part
         filled.append(
@@ -176,7 +158,7 @@ def simulate_pose(preset: Preset, seed: int, index: int) -> tuple[list[SampleRow
                     "measured_px": int((part != Part.NONE).sum()),
                     "visible_leaf_px": int((part == Part.LEAF).sum()),
                     "visible_frame_px": int((part == Part.FRAME).sum()),
-                    "visible_opening_px": _opening_px(row, frame),
+                    "visible_opening_px": int(looks_into(frame.full.depth_m, opening_m).sum()),
                     "same_image_as": " ".join(twins),
                     "depth_sha256": hashlib.sha256(frame.cut.depth_m.tobytes()).hexdigest(),
                 }
@@ -208,28 +190,3 @@ def find_preset(name: str) -> Preset:
     if name not in PRESETS:
         raise ConfigError(f"no preset {name!r}: choose one of {', '.join(PRESETS)}")
     return PRESETS[name]
-
-
-def _same_image(one: NDArray[np.float32], other: NDArray[np.float32]) -> bool:
-    measured = ~np.isnan(one)
-    return bool(
-        np.array_equal(measured, ~np.isnan(other))
-        and np.abs(one[measured] - other[measured]).max(initial=0.0) <= _SAME_IMAGE_M
-    )
-
-
-def _opening_px(row: SampleRow, frame: Frame) -> int:
-    """Pixels that look into the opening: their ray meets its rectangle on the robot's wall face, and nothing before."""
-    door, heading = row.door, math.radians(row.heading_deg)
-    depth = frame.full.depth_m
-    intrinsics = row.camera.intrinsics()
-    # A unit-depth point per pixel, in the gravity-aligned sensor frame, is the ray's direction.
-    ray = level(depth_to_points(np.ones_like(depth), intrinsics), math.radians(row.pitch_deg))
-    ray_y = math.sin(heading) * ray[..., 0] + math.cos(heading) * ray[..., 1]
-    ray_x = math.cos(heading) * ray[..., 0] - math.sin(heading) * ray[..., 1]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        reach = -row.y_m / ray_y
-        inside = np.abs(row.x_m + reach * ray_x) < door.opening_width_m / 2
-        z = row.camera_height_m + reach * ray[..., 2]
-        inside &= (reach > 0) & (z > 0) & (z < door.opening_height_m)
-        return int((inside & (depth >= reach - _SAME_IMAGE_M)).sum())

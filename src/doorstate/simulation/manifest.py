@@ -14,36 +14,40 @@ from pydantic import ValidationError
 from doorstate.errors import DatasetError
 from doorstate.files import write_text
 from doorstate.simulation.generate import SampleRow
+from doorstate.simulation.scene_rows import SceneRow
+
+Row = SampleRow | SceneRow
 
 
-def flatten(row: SampleRow) -> dict[str, str]:
-    """Columns and their text, in the order of the model's fields."""
+def flatten(row: Row) -> dict[str, str]:
+    """Columns and their text, in the order of the model's fields; what a row does not have is empty."""
     columns: dict[str, str] = {}
     for name, value in row.model_dump().items():
         if isinstance(value, dict):
             columns |= {f"{name}.{key}": str(inner) for key, inner in value.items()}
         else:
-            columns[name] = str(value)
+            columns[name] = "" if value is None else str(value)
     return columns
 
 
-def unflatten(columns: Mapping[str, str]) -> SampleRow:
+def unflatten(columns: Mapping[str, str]) -> Row:
     """The row behind a line of a manifest; columns the model does not know are left out.
 
     Raises:
         DatasetError: a column is missing or holds what it cannot hold.
     """
+    model: type[Row] = SceneRow if columns.get("scene") else SampleRow
     nested: dict[str, Any] = {}
     for name, value in columns.items():
         outer, _, inner = name.partition(".")
-        if outer not in SampleRow.model_fields:
+        if outer not in model.model_fields or (model is SceneRow and not value):
             continue
         if inner:
             nested.setdefault(outer, {})[inner] = value
         else:
             nested[outer] = value
     try:
-        return SampleRow.model_validate(nested)
+        return model.model_validate(nested)
     except ValidationError as error:
         problem = error.errors()[0]
         column = ".".join(str(step) for step in problem["loc"])

@@ -11,51 +11,42 @@ import json
 import shutil
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from PIL import Image
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from doorstate.clouds.pcd import write_pcd
 from doorstate.errors import ConfigError, DatasetError
 from doorstate.files import atomic_path, is_vacant, write_text
-from doorstate.jobs import Progress, default_workers, no_progress, piece_paths, run_pieces
-from doorstate.simulation.generate import Frame, Preset, SampleRow, pose_indices, simulate_pose
-from doorstate.simulation.manifest import flatten, read_csv, write_csv
+from doorstate.jobs import Progress, Shard, default_workers, no_progress, piece_paths, run_pieces
+from doorstate.simulation.frames import Frame
+from doorstate.simulation.manifest import Row, flatten, read_csv, write_csv
+from doorstate.simulation.settings import RAW_KINDS as RAW_KINDS
+from doorstate.simulation.settings import RawKind, Settings
+from doorstate.simulation.settings import SimulationSettings as SimulationSettings
 from doorstate.simulation.shading import shade
 
-RawKind = Literal["pcd", "depth", "image"]
-RAW_KINDS: tuple[RawKind, ...] = ("pcd", "depth", "image")
 MANIFEST = "manifest.csv"
 _SETTINGS = "simulation.json"
-_POSES_PER_PIECE = 8
-
-
-class SimulationSettings(BaseModel):
-    """What was simulated; a folder is continued only with the same settings."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    preset: Preset
-    seed: int
-    poses: int | None
-    raw: tuple[RawKind, ...] = ()
+_PER_PIECE = 8
+_ANY_SETTINGS: TypeAdapter[Settings] = TypeAdapter(Settings)
 
 
 class _Piece(NamedTuple):
-    settings: SimulationSettings
+    settings: Settings
     indices: list[int]
     folder: Path
 
 
 def simulate_dataset(
     folder: Path,
-    settings: SimulationSettings,
+    settings: Settings,
     workers: int | None = None,
     progress: Progress = no_progress,
 ) -> list[dict[str, str]]:
-    """Simulate into `folder`, going on where a killed run stopped.
+    """Simulate into `folder`, going on where a killed run or shards of it stopped.
 
     Returns:
         The manifest's rows.
@@ -69,12 +60,7 @@ def simulate_dataset(
         shutil.rmtree(scratch, ignore_errors=True)
         progress(1, 1)
         return read_csv(manifest)
-    indices = pose_indices(settings.poses)
-    pieces = [
-        _Piece(settings, indices[start : start + _POSES_PER_PIECE], folder)
-        for start in range(0, len(indices), _POSES_PER_PIECE)
-    ]
-    paths = piece_paths(scratch, len(pieces), ".csv")
+    pieces, paths = _pieces(folder, settings)
     run_pieces(_simulate_piece, pieces, paths, workers or default_workers(), progress)
     rows = [row for path in paths for row in read_csv(path)]
     write_csv(manifest, rows)
@@ -82,7 +68,29 @@ def simulate_dataset(
     return rows
 
 
-def read_settings(folder: Path) -> SimulationSettings:
+def simulate_shard(
+    folder: Path,
+    settings: Settings,
+    shard: Shard,
+    workers: int | None = None,
+    progress: Progress = no_progress,
+) -> None:
+    """Simulate the pieces of one shard into `folder`; `simulate_dataset` joins them when all shards are done.
+
+    Shards may run at the same time in one folder, or in folders whose `pieces` are copied together later.
+
+    Raises:
+        ConfigError: the folder holds something else.
+    """
+    _claim(folder, settings)
+    if (folder / MANIFEST).exists():
+        progress(1, 1)
+        return
+    pieces, paths = _pieces(folder, settings)
+    run_pieces(_simulate_piece, shard.of(pieces), shard.of(paths), workers or default_workers(), progress)
+
+
+def read_settings(folder: Path) -> Settings:
     """What a simulated folder holds.
 
     Raises:
@@ -90,7 +98,7 @@ def read_settings(folder: Path) -> SimulationSettings:
     """
     path = folder / _SETTINGS
     try:
-        return SimulationSettings.model_validate_json(path.read_text(encoding="utf-8"))
+        return _ANY_SETTINGS.validate_json(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         raise DatasetError(f"{folder}: holds no {_SETTINGS}; make one with 'doorstate simulate'") from error
     except ValidationError as error:
@@ -102,27 +110,36 @@ def is_simulated(folder: Path) -> bool:
     return (folder / _SETTINGS).is_file()
 
 
-def _claim(folder: Path, settings: SimulationSettings) -> None:
-    if is_simulated(folder):
-        if read_settings(folder) != settings:
-            raise ConfigError(f"{folder}: holds a simulation with other settings; choose another folder")
-        return
-    if not is_vacant(folder):
+def _claim(folder: Path, settings: Settings) -> None:
+    if is_vacant(folder):
+        write_text(folder / _SETTINGS, json.dumps(settings.model_dump(), indent=2) + "\n")
+    elif not is_simulated(folder):
         raise ConfigError(f"{folder}: exists and holds something else; choose another folder")
-    write_text(folder / _SETTINGS, json.dumps(settings.model_dump(), indent=2) + "\n")
+    # Also after writing: another shard may have claimed the folder at the same moment.
+    if read_settings(folder) != settings:
+        raise ConfigError(f"{folder}: holds a simulation with other settings; choose another folder")
+
+
+def _pieces(folder: Path, settings: Settings) -> tuple[list[_Piece], list[Path]]:
+    indices = settings.indices()
+    pieces = [
+        _Piece(settings, indices[start : start + _PER_PIECE], folder)
+        for start in range(0, len(indices), _PER_PIECE)
+    ]
+    return pieces, piece_paths(folder / "pieces", len(pieces), ".csv")
 
 
 def _simulate_piece(piece: _Piece, path: Path) -> None:
-    rows: list[SampleRow] = []
+    rows: list[Row] = []
     for index in piece.indices:
-        pose_rows, frames = simulate_pose(piece.settings.preset, piece.settings.seed, index)
-        for row, frame in zip(pose_rows, frames, strict=True):
+        new, frames = piece.settings.simulate(index)
+        for row, frame in zip(new, frames, strict=True):
             _write_raw(piece.folder, row, frame, piece.settings.raw)
-        rows += pose_rows
+        rows += new
     write_csv(path, [flatten(row) for row in rows])
 
 
-def _write_raw(folder: Path, row: SampleRow, frame: Frame, kinds: Iterable[RawKind]) -> None:
+def _write_raw(folder: Path, row: Row, frame: Frame, kinds: Iterable[RawKind]) -> None:
     # One folder per state: the layout that `doorstate prepare` takes from anybody.
     for kind in kinds:
         if kind == "pcd":

@@ -16,6 +16,9 @@ from doorstate.types import Part
 
 Hinge = Literal["left", "right"]
 Swing = Literal["away", "towards"]
+Material = Literal[
+    "matte", "gloss", "dark", "glass"
+]  # what it does to a depth camera (simulation.noise.materials)
 
 
 class Box(NamedTuple):
@@ -25,6 +28,7 @@ class Box(NamedTuple):
     center_m: tuple[float, float, float]
     size_m: tuple[float, float, float]
     yaw_rad: float = 0.0
+    material: Material = "matte"
 
 
 class Door(BaseModel):
@@ -66,10 +70,16 @@ def build_scene(door: Door, opening_angle_rad: float) -> list[Box]:
     Returns:
         Boxes in the door frame.
     """
-    return [*_wall(door), *_frame(door), _leaf(door, opening_angle_rad), _floor(door)]
+    return [
+        *wall_boxes(door),
+        *frame_boxes(door),
+        _leaf(door, opening_angle_rad),
+        floor_box(door.floor_size_m),
+    ]
 
 
-def _wall(door: Door) -> list[Box]:
+def wall_boxes(door: Door) -> list[Box]:
+    """The wall on both sides of the opening and above it."""
     inner = door.opening_width_m / 2 + door.jamb_thickness_m
     top = door.opening_height_m + door.jamb_thickness_m
     length = door.wall_half_length_m - inner
@@ -82,14 +92,15 @@ def _wall(door: Door) -> list[Box]:
     ]
 
 
-def _frame(door: Door) -> list[Box]:
+def frame_boxes(door: Door, leaf_recess_m: float = 0.0) -> list[Box]:
+    """Jambs, casings and the stop; the closed leaf lies `leaf_recess_m` behind the face that it swings out of."""
     half, height, wall = door.opening_width_m / 2, door.opening_height_m, door.wall_thickness_m
     jamb, casing, stop = door.jamb_thickness_m, door.casing_width_m, door.stop_width_m
     boxes = _portal(half, height, jamb, jamb, wall, -wall / 2)
     for face_y in (door.casing_thickness_m / 2, -wall - door.casing_thickness_m / 2):
         boxes += _portal(half, height, casing, casing, door.casing_thickness_m, face_y)
-    # The leaf closes against the stop: flush with the wall face on its hinge side.
-    inset = door.leaf_thickness_m + door.stop_depth_m / 2
+    # The leaf closes against the stop: flush, if not recessed, with the wall face on its hinge side.
+    inset = leaf_recess_m + (door.leaf_thickness_m + door.stop_depth_m / 2)
     stop_y = inset - wall if door.swing == "away" else -inset
     return boxes + _portal(half - stop, height - stop, stop, stop, door.stop_depth_m, stop_y)
 
@@ -124,5 +135,6 @@ def _leaf(door: Door, opening_angle_rad: float) -> Box:
     return Box(Part.LEAF, center, (width, door.leaf_thickness_m, height), turn)
 
 
-def _floor(door: Door) -> Box:
-    return Box(Part.FLOOR, (0.0, 0.0, -_SLAB_M / 2), (door.floor_size_m, door.floor_size_m, _SLAB_M))
+def floor_box(size_m: float) -> Box:
+    """A square floor."""
+    return Box(Part.FLOOR, (0.0, 0.0, -_SLAB_M / 2), (size_m, size_m, _SLAB_M))

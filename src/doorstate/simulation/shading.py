@@ -11,7 +11,7 @@ from doorstate.clouds.depth import depth_to_points
 from doorstate.simulation.sensor import Render
 from doorstate.types import Part
 
-_COLORS = {
+COLORS = {
     Part.WALL: (226, 221, 208),
     Part.FRAME: (120, 92, 66),
     Part.LEAF: (178, 126, 74),
@@ -21,7 +21,7 @@ _COLORS = {
     Part.NONE: (28, 32, 40),
 }
 _PALETTE = np.zeros((256, 3), dtype=np.float32)
-for _part, _color in _COLORS.items():
+for _part, _color in COLORS.items():
     _PALETTE[_part] = _color
 _LAMP = np.array([-0.75, 0.45, 0.48])  # towards the light, in the sensor frame
 

@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From what a manifest row says to its frame, bit for bit."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from doorstate.clouds.camera import Intrinsics
+from doorstate.clouds.depth import depth_to_points
+from doorstate.simulation.scene import Box
+from doorstate.simulation.sensor import CameraPose, DepthCamera, Render, cut_range, render_behind_glass
+from doorstate.types import DepthImage, Points
+
+SAME_IMAGE_M = 1e-4
+
+
+class Sample(Protocol):
+    """A row that can be replayed."""
+
+    @property
+    def camera(self) -> DepthCamera:
+        """The camera."""
+
+    def camera_pose(self) -> CameraPose:
+        """Where it is, in the door frame."""
+
+    def boxes(self) -> list[Box]:
+        """What it looks at."""
+
+
+class Frame(NamedTuple):
+    """A replayed sample."""
+
+    full: Render  # before the range cut: what a colour camera would see
+    cut: Render  # what the depth camera reports
+    points: Points  # (H, W, 3) metres, gravity-aligned sensor frame
+
+
+def replay(row: Sample) -> Frame:
+    """Rebuild the frame of a manifest row, bit for bit."""
+    pose, intrinsics = row.camera_pose(), row.camera.intrinsics()
+    full = render_behind_glass(row.boxes(), pose, intrinsics)
+    cut = cut_range(full, row.camera)
+    points = depth_to_points(cut.depth_m, intrinsics)
+    return Frame(full, cut, level(points, pose.pitch_rad, pose.roll_rad))
+
+
+def level(points: Points, pitch_rad: float, roll_rad: float = 0.0) -> Points:
+    """Turn points of a tilted camera back to a level sensor frame.
+
+    Args:
+        points: (..., 3) metres.
+        pitch_rad: positive looks down.
+        roll_rad: positive turns the camera clockwise, as seen from behind it.
+    """
+    if roll_rad:
+        cos, sin = math.cos(roll_rad), math.sin(roll_rad)
+        x, y, z = points[..., 0], points[..., 1], points[..., 2]
+        points = np.stack([x, cos * y - sin * z, sin * y + cos * z], axis=-1).astype(np.float32)
+    if not pitch_rad:
+        return points
+    cos, sin = math.cos(pitch_rad), math.sin(pitch_rad)
+    x, y, z = points[..., 0], points[..., 1], points[..., 2]
+    return np.stack([cos * x + sin * z, y, cos * z - sin * x], axis=-1).astype(np.float32)
+
+
+def same_image(one: DepthImage, other: DepthImage) -> bool:
+    """Whether two depth images are equal to 0.1 mm, and NaN in the same pixels."""
+    measured = ~np.isnan(one)
+    return bool(
+        np.array_equal(measured, ~np.isnan(other))
+        and np.abs(one[measured] - other[measured]).max(initial=0.0) <= SAME_IMAGE_M
+    )
+
+
+def opening_depth_m(pose: CameraPose, intrinsics: Intrinsics, width_m: float, height_m: float) -> DepthImage:
+    """Z-depth at which rays meet an opening, which is a rectangle on the robot's wall face.
+
+    Args:
+        pose: the camera in the door frame.
+        intrinsics: of the camera.
+        width_m: of the opening.
+        height_m: of the opening.
+
+    Returns:
+        (H, W) float32 metres, NaN for rays that do not meet it.
+    """
+    # A unit-depth point per pixel, in the gravity-aligned sensor frame, is the ray's direction.
+    unit = np.ones((intrinsics.height, intrinsics.width), np.float32)
+    ray = level(depth_to_points(unit, intrinsics), pose.pitch_rad, pose.roll_rad)
+    ray_y = math.sin(pose.yaw_rad) * ray[..., 0] + math.cos(pose.yaw_rad) * ray[..., 1]
+    ray_x = math.cos(pose.yaw_rad) * ray[..., 0] - math.sin(pose.yaw_rad) * ray[..., 1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        reach = -pose.y_m / ray_y
+        inside = np.abs(pose.x_m + reach * ray_x) < width_m / 2
+        z = pose.z_m + reach * ray[..., 2]
+        inside &= (reach > 0) & (z > 0) & (z < height_m)
+    return np.where(inside, reach, np.float32(np.nan))
+
+
+def looks_into(depth_m: DepthImage, opening_m: DepthImage) -> NDArray[np.bool_]:
+    """Pixels (H, W) of an uncut depth image that meet an opening, and nothing before it."""
+    met: NDArray[np.bool_] = depth_m >= opening_m - SAME_IMAGE_M
+    return met

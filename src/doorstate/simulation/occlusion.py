@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How much of a door is hidden by what stands before it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from doorstate.simulation.doors import Opening
+from doorstate.simulation.frames import looks_into, opening_depth_m
+from doorstate.simulation.scene import Box
+from doorstate.simulation.scenes import Scene, scene_boxes
+from doorstate.simulation.sensor import CameraPose, DepthCamera, render, render_behind_glass
+from doorstate.types import Part
+
+BINS = ("0", "0-25", "25-50", "50-75", "75-100")  # per cent
+_AS_GOOD_AS_NOTHING = 0.01
+
+
+class DoorView:
+    """The pixels of a door that nothing stands before: those of its leaf, of its frame, and into its opening."""
+
+    def __init__(self, scene: Scene, opening: Opening, pose: CameraPose, camera: DepthCamera) -> None:
+        assert scene.door is not None
+        self._pose, self._intrinsics = pose, camera.intrinsics()
+        alone = scene.model_copy(update={"items": ()})
+        seen = render_behind_glass(scene_boxes(alone, opening), pose, self._intrinsics)
+        size = scene.door.opening_width_m, scene.door.opening_height_m
+        self._depth = seen.depth_m
+        self._door = (seen.part == Part.LEAF) | (seen.part == Part.FRAME)
+        self._door |= looks_into(seen.depth_m, opening_depth_m(pose, self._intrinsics, *size))
+
+    def occluded_share(self, clutter: list[Box]) -> float:
+        """Share of the pixels that the boxes hide; 0 where no pixel sees the door."""
+        hidden = self._door & (render(clutter, self._pose, self._intrinsics).depth_m < self._depth)
+        return round(int(hidden.sum()) / max(int(self._door.sum()), 1), 6)
+
+
+def occluded_bin(share: float) -> str:
+    """Name of the bin; less than 1 % is nothing, and an upper edge belongs to its bin."""
+    if share < _AS_GOOD_AS_NOTHING:
+        return BINS[0]
+    return BINS[1 + int(np.searchsorted((0.25, 0.5, 0.75), share))]

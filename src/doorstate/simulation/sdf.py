@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A scene as an SDF world: its boxes and the depth camera that looks at them, for Gazebo (SDFormat 1.7).
+
+World frame is the door frame (scene.py). The camera is that of a manifest row, and its image the row's frame.
+"""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ET
+
+from doorstate.simulation.frames import Sample
+from doorstate.simulation.scene import Box
+from doorstate.simulation.sensor import CameraPose, DepthCamera
+from doorstate.simulation.shading import COLORS
+
+_FAR_M = 20.0  # beyond the depth that is reported, as Gazebo reports what is clipped as infinite
+_GLASS_TRANSPARENCY = 0.8
+
+
+def sdf_world(row: Sample, name: str) -> str:
+    """The world of a row, as XML text that reads back to the same numbers."""
+    sdf = ET.Element("sdf", version="1.7")
+    world = ET.SubElement(sdf, "world", name=name)
+    light = ET.SubElement(world, "light", name="sun", type="directional")
+    _leaf(light, "pose", "0 0 10 0 0 0")
+    _leaf(light, "direction", "-0.5 -0.4 -0.8")
+    model = ET.SubElement(world, "model", name="scene")
+    _leaf(model, "static", "true")
+    link = ET.SubElement(model, "link", name="boxes")
+    for number, box in enumerate(row.boxes()):
+        _add_box(link, f"{number:03d}_{box.part.name.lower()}", box)
+    _add_camera(world, row.camera_pose(), row.camera)
+    ET.indent(sdf)
+    return ET.tostring(sdf, encoding="unicode", xml_declaration=True) + "\n"
+
+
+def _add_box(link: ET.Element, name: str, box: Box) -> None:
+    for kind in ("visual", "collision"):
+        element = ET.SubElement(link, kind, name=name)
+        _leaf(element, "pose", _numbers(*box.center_m, 0.0, 0.0, box.yaw_rad))
+        geometry = ET.SubElement(ET.SubElement(element, "geometry"), "box")
+        _leaf(geometry, "size", _numbers(*box.size_m))
+        if kind == "visual":
+            material = ET.SubElement(element, "material")
+            color = _numbers(*(round(level / 255, 3) for level in COLORS[box.part]), 1.0)
+            _leaf(material, "ambient", color)
+            _leaf(material, "diffuse", color)
+            if box.material == "glass":
+                _leaf(element, "transparency", str(_GLASS_TRANSPARENCY))
+
+
+def _add_camera(world: ET.Element, pose: CameraPose, camera: DepthCamera) -> None:
+    model = ET.SubElement(world, "model", name="depth_camera")
+    _leaf(model, "static", "true")
+    _leaf(model, "pose", _numbers(*pose[:3], pose.roll_rad, pose.pitch_rad, pose.yaw_rad))
+    sensor = ET.SubElement(ET.SubElement(model, "link", name="link"), "sensor", name="depth", type="depth")
+    _leaf(sensor, "always_on", "true")
+    _leaf(sensor, "update_rate", "1")
+    optics = ET.SubElement(sensor, "camera")
+    _leaf(optics, "horizontal_fov", repr(math.radians(camera.hfov_deg)))
+    image = ET.SubElement(optics, "image")
+    _leaf(image, "width", str(camera.width))
+    _leaf(image, "height", str(camera.height))
+    _leaf(image, "format", "R8G8B8")
+    clip = ET.SubElement(optics, "clip")
+    _leaf(clip, "near", "0.05")
+    _leaf(clip, "far", str(_FAR_M))
+
+
+def _leaf(parent: ET.Element, tag: str, text: str) -> None:
+    ET.SubElement(parent, tag).text = text
+
+
+def _numbers(*values: float) -> str:
+    return " ".join(repr(float(value)) for value in values)
