@@ -28,7 +28,8 @@ def main() -> None:
     """Build, install, ask; the environment is gone afterwards."""
     with tempfile.TemporaryDirectory(prefix="doorstate-") as name:
         folder = Path(name)
-        _, _ = _timed([sys.executable, "-m", "build", "--outdir", folder, REPOSITORY])
+        print("building the wheel", flush=True)
+        _timed([sys.executable, "-m", "build", "--outdir", folder, REPOSITORY])
         (wheel,) = folder.glob("*.whl")
         venv.create(folder / "venv", with_pip=True)
         binaries = folder / "venv" / "bin"
@@ -36,8 +37,9 @@ def main() -> None:
         lock = (REPOSITORY / "requirements.lock").read_text(encoding="utf-8")
         constraint.write_text(next(line for line in lock.splitlines() if line.startswith("torch==")))
         pip = [binaries / "python", "-m", "pip", "install", "--quiet", "--constraint", constraint]
+        print(f"installing {wheel.name} into an empty environment", flush=True)
         _, seconds = _timed([*pip, wheel])
-        print(f"pip install {wheel.name}: {seconds:.0f} s")
+        print(f"pip install {wheel.name}: {seconds:.0f} s", flush=True)
 
         _, frames = simulate_pose(PRESETS["ogurob"], seed=3, index=360)
         clouds = {state: folder / f"{state}.pcd" for state in STATES}
@@ -49,7 +51,10 @@ def main() -> None:
             for state, path in clouds.items():
                 said, seconds = _timed([binaries / "doorstate", "predict", path, *options, "--json"])
                 answer = json.loads(said)["state"]
-                print(f"doorstate predict {path.name} {' '.join(options)}: {answer}, {seconds:.1f} s")
+                print(
+                    f"doorstate predict {path.name} {' '.join(options)}: {answer}, {seconds:.1f} s",
+                    flush=True,
+                )
                 if answer != state:
                     sys.exit(f"fresh_install: {path.name} is {state}, and the answer was {answer}")
 
