@@ -122,9 +122,10 @@ def factors_figure(results: ComparisonResults, dataset: PreparedDataset) -> Figu
                 for each in bins
                 if each.method == method and each.factor == title and each.samples >= _FEWEST
             ]
+            x, y = _line(shown)
             axis.plot(
-                [(each.low + each.high) / 2 for each in shown],
-                [each.right / each.samples for each in shown],
+                x,
+                y,
                 "--" if method in results.comparison.rules else "-",
                 marker="o",
                 markersize=3,
@@ -140,3 +141,15 @@ def factors_figure(results: ComparisonResults, dataset: PreparedDataset) -> Figu
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=min(6, len(labels)), frameon=False)
     return figure
+
+
+def _line(bins: list[Bin]) -> tuple[list[float], list[float]]:
+    """Middles and accuracies, with a gap where a bin is missing."""
+    x, y = [], []
+    for before, each in zip([None, *bins], bins, strict=False):
+        if before is not None and before.high != each.low:
+            x.append(before.high)
+            y.append(math.nan)
+        x.append((each.low + each.high) / 2)
+        y.append(each.right / each.samples)
+    return x, y
