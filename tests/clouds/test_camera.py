@@ -7,11 +7,13 @@ import json
 import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from doorstate.clouds.camera import Intrinsics, read_intrinsics
+from doorstate.clouds.depth import depth_to_points
 from doorstate.errors import CameraError
 
 CAMERA = Intrinsics(640, 480, 617.25, 617.5, 317.25, 245.75)
@@ -180,3 +182,10 @@ def _camera_or_error(path: Path) -> Intrinsics | CameraError:
         return read_intrinsics(path)
     except CameraError as error:
         return error
+
+
+def test_intrinsics_of_the_turned_image_see_the_same_rays() -> None:
+    camera = Intrinsics(7, 5, 4.0, 3.0, 2.5, 2.2)
+    depth_m = np.random.default_rng(0).uniform(1, 3, (5, 7))
+    turned = depth_to_points(np.rot90(depth_m, -1), camera.turned_clockwise())
+    np.testing.assert_allclose(turned, np.rot90(depth_to_points(depth_m, camera, roll_deg=90), -1), rtol=1e-6)

@@ -5,15 +5,17 @@ from __future__ import annotations
 
 import io
 import struct
+from contextlib import suppress
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
+from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 from numpy.typing import NDArray
 from PIL import Image
 
-from doorstate.clouds.png import parse_depth_png
+from doorstate.clouds.png import parse_coarse_png, parse_depth_png
 from doorstate.errors import CloudReadError
 
 
@@ -53,3 +55,34 @@ def test_a_huge_declared_size_is_refused_before_decoding() -> None:
 def test_other_bytes_are_no_png(data: bytes) -> None:
     with pytest.raises(CloudReadError, match="no PNG"):
         parse_depth_png(data)
+
+
+@given(npst.arrays(np.uint8, npst.array_shapes(min_dims=2, max_dims=2, max_side=20)), st.booleans())
+@settings(deadline=None, max_examples=50)
+def test_eight_bits_are_read_where_they_are_asked_for(depth: NDArray[np.uint8], as_colour: bool) -> None:
+    image = Image.fromarray(depth)
+    pixels = parse_coarse_png(_png(image.convert("RGB") if as_colour else image))
+    assert pixels.dtype == np.uint8
+    np.testing.assert_array_equal(pixels, depth)
+
+
+@pytest.mark.parametrize(
+    ("image", "message"),
+    [
+        (Image.new("RGB", (20, 20), (1, 1, 2)), "colour image"),
+        (Image.new("LA", (20, 20)), "no grey image"),
+        (Image.new("1", (20, 20)), "1-bit image"),
+        (Image.new("I;16", (20, 20)), "16-bit image"),
+    ],
+)
+def test_other_images_are_no_coarse_depth(image: Image.Image, message: str) -> None:
+    with pytest.raises(CloudReadError, match=message):
+        parse_coarse_png(_png(image))
+
+
+@given(st.integers(0, 400), st.binary(max_size=30))
+@settings(deadline=None, max_examples=50)
+def test_damaged_coarse_images_are_read_or_refused(keep: int, rest: bytes) -> None:
+    whole = _png(Image.fromarray(np.arange(400, dtype=np.uint8).reshape(20, 20)))
+    with suppress(CloudReadError):
+        assert parse_coarse_png(whole[:keep] + rest).ndim == 2

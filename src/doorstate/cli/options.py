@@ -30,6 +30,12 @@ IntrinsicsFile = Annotated[
 Focal = Annotated[
     float | None, typer.Option(help="Focal length or centre in pixels, in place of --intrinsics.")
 ]
+LayoutName = Annotated[
+    str | None,
+    typer.Option(
+        "--layout", help="A published data set as it is laid out: deepdoors2 (also its predecessor)."
+    ),
+]
 # Who answers, and recordings to answer: the same options for `predict`, `view` and `serve`.
 Network = Annotated[str, typer.Option(help="Network whose packaged weights to use.")]
 Weights = Annotated[Path | None, typer.Option(help="A weights file of your own, in place of --network.")]
@@ -69,11 +75,16 @@ def read_options(
     depth_scale: float,
     intrinsics_file: Path | None,
     flags: tuple[float | None, float | None, float | None, float | None],
+    layout: str | None = None,
 ) -> ReadOptions:
     """What the options say of cloud files; one error line for what does not fit together."""
     from doorstate.clouds.camera import read_intrinsics
     from doorstate.clouds.io import options_from_flags
 
+    if layout is not None and (frame, roll, units, depth_scale) != ("body", 0, "m", 0.001):
+        raise ConfigError(
+            "--layout says how its files are read: leave --frame, --roll, --units and --depth-scale out"
+        )
     intrinsics = None if intrinsics_file is None else read_intrinsics(intrinsics_file)
     return options_from_flags(frame, roll, units, depth_scale, intrinsics, flags)
 

@@ -48,6 +48,10 @@ class Intrinsics:
         focal = width / (2 * math.tan(hfov_rad / 2))
         return cls(width, height, focal, focal, (width - 1) / 2, (height - 1) / 2)
 
+    def turned_clockwise(self) -> Intrinsics:
+        """Those of the image turned clockwise by 90 degrees: pixel (u, v) goes to (height - 1 - v, u)."""
+        return Intrinsics(self.height, self.width, self.fy, self.fx, self.height - 1 - self.cy, self.cx)
+
     def check_image_size(self, width: int, height: int) -> None:
         """Raise CameraError unless an image of this size belongs to the camera."""
         if (width, height) != (self.width, self.height):

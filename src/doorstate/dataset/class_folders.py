@@ -33,6 +33,23 @@ def state_of_folder(name: str) -> DoorState | None:
     return next((state for state, spelling in _SPELLINGS if spelling.search(letters)), None)
 
 
+def state_of_path(root: Path, path: Path) -> DoorState | None:
+    """The state that the nearest folder of a file spells, up to `root` itself."""
+    names = (root.name, *path.relative_to(root).parts[:-1])
+    states = (state_of_folder(name) for name in reversed(names))
+    return next((state for state in states if state is not None), None)
+
+
+def row_of(root: Path, path: Path, state: DoorState) -> dict[str, str]:
+    """Manifest row of a file below `root`."""
+    relative = path.relative_to(root)
+    return {
+        "sample_id": relative.with_suffix("").as_posix(),
+        "state": state.label,
+        "file": relative.as_posix(),
+    }
+
+
 def labelled_rows(root: Path, poses_csv: Path | None = None) -> list[dict[str, str]]:
     """One manifest row for every cloud under a class folder, with strata where its pose is known.
 
@@ -52,16 +69,11 @@ def labelled_rows(root: Path, poses_csv: Path | None = None) -> list[dict[str, s
     poses = _read_poses(poses_csv) if poses_csv else {}
     rows, unused = [], set(poses)
     for path in find_clouds([root]):
-        relative = path.relative_to(root)
-        states = [state_of_folder(name) for name in (root.name, *relative.parts[:-1])]
-        state = next((found for found in reversed(states) if found is not None), None)
+        state = state_of_path(root, path)
         if state is None:
             continue
-        row = {
-            "sample_id": relative.with_suffix("").as_posix(),
-            "state": state.label,
-            "file": relative.as_posix(),
-        }
+        row = row_of(root, path, state)
+        relative = path.relative_to(root)
         key = next((k for k in (relative.as_posix(), relative.name) if k in poses), None)
         if key:
             row |= poses[key]
