@@ -8,21 +8,45 @@ from typing import Annotated, Any
 
 import typer
 
-from doorstate.cli.options import DepthScale, Focal, Frame, IntrinsicsFile, Roll, Units, Workers, read_options
+from doorstate.cli.options import (
+    DepthScale,
+    Focal,
+    Frame,
+    IntrinsicsFile,
+    LayoutName,
+    Roll,
+    Units,
+    Workers,
+    read_options,
+)
 from doorstate.errors import ConfigError
+
+ShardOption = Annotated[
+    str | None, typer.Option(help="Do only this share, such as 2/8; without it all shares are joined.")
+]
 
 
 def simulate(
     out: Annotated[Path, typer.Option(help="Folder to make, or to go on with.")],
-    preset: Annotated[str, typer.Option(help="ogurob, ogurob-fixed or ogurob-away.")] = "ogurob",
+    preset: Annotated[
+        str,
+        typer.Option(
+            help="ogurob, ogurob-fixed, ogurob-away (one door, many poses); varied, varied-angles, cluttered, no-door "
+            "(many scenes)."
+        ),
+    ] = "ogurob",
     poses: Annotated[
-        int | None, typer.Option(help="How many of the 1353 robot poses; all if not given.")
+        int | None, typer.Option(help="How many of ogurob's 1353 robot poses; all if not given.")
+    ] = None,
+    scenes: Annotated[
+        int | None, typer.Option(help="How many scenes of the other presets; 1000 if not given.", min=1)
     ] = None,
     seed: Annotated[int, typer.Option(help="Everything random is drawn from it.", min=0)] = 0,
     keep: Annotated[
         list[str] | None, typer.Option(help="Raw files to keep: pcd, depth, image; repeatable.")
     ] = None,
     workers: Workers = None,
+    shard: ShardOption = None,
 ) -> None:
     """Simulate doors seen by a depth camera: a manifest whose every row rebuilds its cloud.
 
@@ -30,25 +54,36 @@ def simulate(
     Examples:
       doorstate simulate --out data/ogurob
       doorstate simulate --out data/small --poses 60 --keep pcd --keep image
+      doorstate simulate --preset varied --scenes 10000 --out data/varied
+      doorstate simulate --preset cluttered --scenes 40000 --shard 2/8 --out data/cluttered
     """
     from doorstate.console import err, print_table, progress_bar
     from doorstate.console import out as stdout
     from doorstate.dataset.strata import BANDS, REGIONS, distance_band, region
-    from doorstate.simulation.generate import find_preset
-    from doorstate.simulation.run import RAW_KINDS, SimulationSettings, simulate_dataset
+    from doorstate.jobs import Shard
+    from doorstate.simulation.generate import PRESETS
+    from doorstate.simulation.run import RAW_KINDS, simulate_dataset, simulate_shard
+    from doorstate.simulation.settings import settings_for
 
     unknown = [kind for kind in keep or [] if kind not in RAW_KINDS]
     if unknown:
         raise ConfigError(f"--keep {unknown[0]}: choose from {', '.join(RAW_KINDS)}")
     kinds: Any = tuple(kind for kind in RAW_KINDS if kind in (keep or []))
-    settings = SimulationSettings(preset=find_preset(preset), seed=seed, poses=poses, raw=kinds)
+    settings = settings_for(preset, seed, poses, scenes, kinds)
+    if shard is not None:
+        share = Shard.parse(shard)
+        with progress_bar("Simulating") as progress:
+            simulate_shard(out, settings, share, workers, progress)
+        stdout.print(f"share {shard} is in {out}; when all are, the same command without --shard joins them")
+        return
     with progress_bar("Simulating") as progress:
         rows = simulate_dataset(out, settings, workers, progress)
     counts = [
         (distance_band(float(row["distance_m"])), region(float(row["robot_angle_deg"]))) for row in rows
     ]
     print_table(
-        "Clouds by distance (m) and angle region (Table 1; a third of each per state)",
+        "Clouds by distance (m) and angle region"
+        + (" (Table 1; a third of each per state)" if preset in PRESETS else ""),
         ["distance", *REGIONS, "all"],
         [
             [
@@ -85,31 +120,45 @@ def prepare(
     cx: Focal = None,
     cy: Focal = None,
     workers: Workers = None,
+    shard: ShardOption = None,
+    layout: LayoutName = None,
 ) -> None:
     """Clean clouds and bring them into farthest-point order, ready for training.
 
     \b
     Examples:
       doorstate prepare data/ogurob --out data/ogurob-4096
+      doorstate prepare data/varied --shard 2/8 --out data/varied-4096
+      doorstate prepare DeepDoors2 --layout deepdoors2 --out data/deepdoors2
       doorstate prepare ~/OGUROB_DOORS --poses poses.csv --frame optical --out data/original
     """
     from doorstate.console import err, progress_bar
     from doorstate.console import out as stdout
-    from doorstate.dataset.prepare import prepare_dataset
-    from doorstate.types import STATES
+    from doorstate.dataset.prepare import prepare_dataset, prepare_shard
+    from doorstate.jobs import Shard
+    from doorstate.types import NO_DOOR, STATES
 
-    options = read_options(frame, roll, units, depth_scale, intrinsics, (fx, fy, cx, cy))
+    options = read_options(frame, roll, units, depth_scale, intrinsics, (fx, fy, cx, cy), layout)
+    if layout is not None and poses is not None:
+        raise ConfigError("--poses is for class folders: leave it out with --layout")
+    if shard is not None:
+        share = Shard.parse(shard)
+        with progress_bar("Preparing") as progress:
+            prepare_shard(source, out, share, points, poses, options, workers, progress, layout)
+        stdout.print(f"share {shard} is in {out}; when all are, the same command without --shard joins them")
+        return
     with progress_bar("Preparing") as progress:
-        summary = prepare_dataset(source, out, points, poses, options, workers, progress)
+        summary = prepare_dataset(source, out, points, poses, options, workers, progress, layout)
     for row in summary.rejected[:10]:
         err.print(f"left out {row['file'] or row['sample_id']}: {row['reason']}", markup=False)
     if summary.rejected:
         err.print(f"{len(summary.rejected)} clouds left out, all in {out / 'rejected.csv'}")
-    counts = [int((summary.dataset.labels == label).sum()) for label in range(len(STATES))]
-    for state, count in zip(STATES, counts, strict=True):
-        if not count:
+    names = (*STATES, NO_DOOR)
+    counts = {name: int((summary.dataset.labels == label).sum()) for label, name in enumerate(names)}
+    for state in STATES:
+        if not counts[state] and summary.dataset.description.kind == "imported":
             err.print(f"no clouds of state {state}: is its folder named in a way we do not know?")
-    shares = ", ".join(f"{count} {state}" for state, count in zip(STATES, counts, strict=True))
+    shares = ", ".join(f"{count} {name}" for name, count in counts.items() if count or name != NO_DOOR)
     stdout.print(f"{len(summary.dataset)} clouds of {points} points in {out} ({shares})", soft_wrap=True)
     if summary.rejected:
         raise typer.Exit(1)

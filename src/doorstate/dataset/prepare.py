@@ -16,6 +16,7 @@ from doorstate import __version__
 from doorstate.clouds.io import ReadOptions, read_cloud
 from doorstate.clouds.preparation import NUM_POINTS
 from doorstate.dataset.class_folders import labelled_rows
+from doorstate.dataset.layouts import find_layout
 from doorstate.dataset.sampled import exactly, sample_frame
 from doorstate.dataset.store import (
     CLOUDS,
@@ -29,7 +30,7 @@ from doorstate.dataset.store import (
 from doorstate.dataset.strata import distance_band, region
 from doorstate.errors import CameraError, CloudError, ConfigError, DatasetError
 from doorstate.files import atomic_path, is_vacant, write_text
-from doorstate.jobs import Progress, default_workers, no_progress, piece_paths, run_pieces
+from doorstate.jobs import Progress, Shard, default_workers, no_progress, piece_paths, run_pieces
 from doorstate.simulation.generate import replay
 from doorstate.simulation.manifest import read_csv, unflatten, write_csv
 from doorstate.simulation.run import MANIFEST as SIMULATED_MANIFEST
@@ -37,6 +38,7 @@ from doorstate.simulation.run import is_simulated, read_settings
 from doorstate.types import Points
 
 REJECTED = "rejected.csv"
+_SCRATCH = "pieces"
 _SAMPLES_PER_PIECE = 24
 
 
@@ -53,6 +55,7 @@ class _Piece(NamedTuple):
     num_points: int
     simulated: bool
     options: ReadOptions
+    layout: str | None
 
 
 def prepare_dataset(
@@ -63,8 +66,9 @@ def prepare_dataset(
     options: ReadOptions | None = None,
     workers: int | None = None,
     progress: Progress = no_progress,
+    layout: str | None = None,
 ) -> PreparationSummary:
-    """Prepare a simulated folder or class folders of clouds into `folder`.
+    """Prepare a simulated folder, class folders of clouds, or a `layout` of `dataset.layouts`, into `folder`.
 
     A cloud with fewer than `num_points` distinct points, or that cannot be read, is left out and listed in
     `rejected.csv` with the reason: every cloud of a prepared data set has exactly `num_points` distinct points.
@@ -73,31 +77,15 @@ def prepare_dataset(
         ConfigError: `folder` holds something prepared from another source or with other settings.
         DatasetError: nothing to prepare, or nothing could be prepared.
     """
-    options = options or ReadOptions()
-    simulated = is_simulated(source)
-    rows = _simulated_rows(source) if simulated else labelled_rows(source, poses_csv)
-    _claim(
-        folder,
-        {
-            "source": str(source.resolve()),
-            "num_points": num_points,
-            "options": repr(options),
-            "rows": _digest(rows),
-        },
-    )
-    scratch = folder / "pieces"
+    pieces, paths = _plan(source, folder, num_points, poses_csv, options, layout)
     if (folder / DESCRIPTION).exists():
-        shutil.rmtree(scratch, ignore_errors=True)
+        shutil.rmtree(folder / _SCRATCH, ignore_errors=True)
         progress(1, 1)
         rejected = read_csv(folder / REJECTED) if (folder / REJECTED).exists() else []
         return PreparationSummary(open_dataset(folder), rejected)
-
-    pieces = [
-        _Piece(rows[start : start + _SAMPLES_PER_PIECE], source, num_points, simulated, options)
-        for start in range(0, len(rows), _SAMPLES_PER_PIECE)
-    ]
-    paths = piece_paths(scratch, len(pieces), ".npz")
     run_pieces(_prepare_piece, pieces, paths, workers or default_workers(), progress)
+    simulated = is_simulated(source)
+    rows = [row for piece in pieces for row in piece.rows]
     rejected = _assemble(folder, rows, paths, num_points, simulated)
     name = read_settings(source).preset.name if simulated else source.resolve().name
     DatasetDescription(
@@ -107,8 +95,64 @@ def prepare_dataset(
         samples=len(rows) - len(rejected),
         doorstate_version=__version__,
     ).save(folder)
-    shutil.rmtree(scratch)
+    shutil.rmtree(folder / _SCRATCH)
     return PreparationSummary(open_dataset(folder), rejected)
+
+
+def prepare_shard(
+    source: Path,
+    folder: Path,
+    shard: Shard,
+    num_points: int = NUM_POINTS,
+    poses_csv: Path | None = None,
+    options: ReadOptions | None = None,
+    workers: int | None = None,
+    progress: Progress = no_progress,
+    layout: str | None = None,
+) -> None:
+    """Prepare the pieces of one shard; `prepare_dataset` with the same arguments joins them when all are done.
+
+    Raises:
+        ConfigError: `folder` holds something prepared from another source or with other settings.
+        DatasetError: nothing to prepare.
+    """
+    pieces, paths = _plan(source, folder, num_points, poses_csv, options, layout)
+    if (folder / DESCRIPTION).exists():
+        progress(1, 1)
+        return
+    run_pieces(_prepare_piece, shard.of(pieces), shard.of(paths), workers or default_workers(), progress)
+
+
+def _plan(
+    source: Path,
+    folder: Path,
+    num_points: int,
+    poses_csv: Path | None,
+    options: ReadOptions | None,
+    layout: str | None,
+) -> tuple[list[_Piece], list[Path]]:
+    """Claim the folder, and say what is to be done and where it goes."""
+    options = options or ReadOptions()
+    simulated = layout is None and is_simulated(source)
+    if layout is not None:
+        rows = find_layout(layout).rows(source)
+    else:
+        rows = _simulated_rows(source) if simulated else labelled_rows(source, poses_csv)
+    _claim(
+        folder,
+        {
+            "source": str(source.resolve()),
+            "num_points": num_points,
+            "options": repr(options),
+            "rows": _digest(rows),
+            **({} if layout is None else {"layout": layout}),
+        },
+    )
+    pieces = [
+        _Piece(rows[start : start + _SAMPLES_PER_PIECE], source, num_points, simulated, options, layout)
+        for start in range(0, len(rows), _SAMPLES_PER_PIECE)
+    ]
+    return pieces, piece_paths(folder / _SCRATCH, len(pieces), ".npz")
 
 
 def _simulated_rows(source: Path) -> list[dict[str, str]]:
@@ -133,16 +177,17 @@ def _digest(rows: Sequence[dict[str, str]]) -> str:
 def _claim(folder: Path, settings: dict[str, object]) -> None:
     path = folder / "preparation.json"
     text = json.dumps(settings, indent=2) + "\n"
-    if path.is_file():
-        if path.read_text(encoding="utf-8") != text:
-            raise ConfigError(f"{folder}: holds a preparation of something else; choose another folder")
-        return
-    if not is_vacant(folder):
+    if is_vacant(folder):
+        write_text(path, text)
+    elif not path.is_file():
         raise ConfigError(f"{folder}: exists and holds something else; choose another folder")
-    write_text(path, text)
+    # Also after writing: another shard may have claimed the folder at the same moment.
+    if path.read_text(encoding="utf-8") != text:
+        raise ConfigError(f"{folder}: holds a preparation of something else; choose another folder")
 
 
 def _prepare_piece(piece: _Piece, path: Path) -> None:
+    read = read_cloud if piece.layout is None else find_layout(piece.layout).read
     clouds: list[Points] = []
     parts: list[np.ndarray] = []
     reasons: list[str] = []
@@ -152,7 +197,7 @@ def _prepare_piece(piece: _Piece, path: Path) -> None:
                 cloud, part = _from_simulation(row, piece.num_points)
                 parts.append(part)
             else:
-                cloud = exactly(read_cloud(piece.source / row["file"], piece.options), piece.num_points)[0]
+                cloud = exactly(read(piece.source / row["file"], piece.options), piece.num_points)[0]
             clouds.append(cloud)
             reasons.append("")
         except (CloudError, CameraError) as error:
