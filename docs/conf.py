@@ -62,6 +62,8 @@ def _read(app: Sphinx, page: str, source: list[str]) -> None:
         text += _contents(text)
     elif page == "commands":
         text += "\n".join(_help_of_commands())
+    elif page == "zoo":
+        text = re.sub(r"\]\(\.\./src/[\w/]+/(\w+)\.md\)", r"](#card-\1)", text) + _model_cards()
     elif page.startswith("benchmarks/"):
         # Tables as `python -m benchmarks` writes them: without headings, reached from the text about them.
         text = "---\norphan: true\n---\n" + re.sub(r"^\*\*(.+)\*\*$", r"# \1", text, flags=re.MULTILINE)
@@ -88,6 +90,15 @@ def _help_of_commands() -> list[str]:
         for name in names
     ]
     return [f"\n## {name}\n\n```text\n{text.strip()}\n```\n" for name, text in zip(names, texts, strict=True)]
+
+
+def _model_cards() -> str:
+    """The cards that lie beside the weights in the package, a level deeper."""
+    cards = sorted((Path(__file__).parents[1] / "src/doorstate/deployment/weights").glob("*.md"))
+    return "".join(
+        f"\n(card-{card.stem})=\n" + re.sub("^#", "##", card.read_text(encoding="utf-8"), flags=re.MULTILINE)
+        for card in cards
+    )
 
 
 def _folders_as_text(app: Sphinx, document: nodes.document) -> None:
