@@ -11,8 +11,9 @@ from pathlib import Path
 
 import pytest
 
+from doorstate.errors import ConfigError
 from doorstate.files import write_text
-from doorstate.jobs import default_workers, piece_paths, run_pieces
+from doorstate.jobs import Shard, default_workers, piece_paths, run_pieces
 
 SCRIPT = """
 import sys
@@ -100,3 +101,17 @@ def test_workers_end_when_their_parent_is_ended(how: signal.Signals, tmp_path: P
 
 def test_there_is_always_a_worker() -> None:
     assert default_workers() >= 1
+
+
+def test_shards_share_all_pieces_among_them() -> None:
+    pieces = list(range(11))
+    for count in (1, 3, 8, 11, 20):
+        shares = [Shard.parse(f"{number}/{count}").of(pieces) for number in range(1, count + 1)]
+        assert sorted(piece for share in shares for piece in share) == pieces
+        assert max(map(len, shares)) - min(map(len, shares)) <= 1
+
+
+@pytest.mark.parametrize("text", ["", "2", "0/3", "4/3", "1/0", "-1/2", "1/2/3", "a/b", "1/2 ", "1.0/2"])
+def test_a_shard_that_is_none_is_refused(text: str) -> None:
+    with pytest.raises(ConfigError, match="such as 2/8"):
+        Shard.parse(text)

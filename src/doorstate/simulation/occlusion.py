@@ -25,9 +25,11 @@ class DoorView:
         alone = scene.model_copy(update={"items": ()})
         seen = render_behind_glass(scene_boxes(alone, opening), pose, self._intrinsics)
         size = scene.door.opening_width_m, scene.door.opening_height_m
-        self._depth = seen.depth_m
-        self._door = (seen.part == Part.LEAF) | (seen.part == Part.FRAME)
-        self._door |= looks_into(seen.depth_m, opening_depth_m(pose, self._intrinsics, *size))
+        opening_m = opening_depth_m(pose, self._intrinsics, *size)
+        solid = (seen.part == Part.LEAF) | (seen.part == Part.FRAME)
+        self._door = solid | looks_into(seen.depth_m, opening_m)
+        # What stands in the room behind hides nothing of an opening.
+        self._depth = np.where(solid, seen.depth_m, np.fmin(seen.depth_m, opening_m))
 
     def occluded_share(self, clutter: list[Box]) -> float:
         """Share of the pixels that the boxes hide; 0 where no pixel sees the door."""

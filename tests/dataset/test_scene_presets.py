@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Simulated scenes prepared: with and without doors, in shards, and refused where three states are learnt."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from doorstate.dataset.loader import CloudLoader
+from doorstate.dataset.prepare import prepare_dataset, prepare_shard
+from doorstate.dataset.splits import draw_splits
+from doorstate.errors import ConfigError
+from doorstate.jobs import Shard
+from doorstate.simulation.run import simulate_dataset
+from doorstate.simulation.scene_rows import PresetName, ScenePreset
+from doorstate.simulation.sensor import DepthCamera
+from doorstate.simulation.settings import SceneSettings
+from doorstate.types import STATES, Part
+
+POINTS = 256
+
+
+@pytest.fixture(scope="module")
+def simulated(tmp_path_factory: pytest.TempPathFactory) -> dict[PresetName, Path]:
+    folders: dict[PresetName, Path] = {}
+    for name, scenes in (("cluttered", 12), ("no-door", 5)):
+        folder = tmp_path_factory.mktemp("scenes") / name
+        preset = ScenePreset(name=name, camera=DepthCamera(width=80, height=60))  # type: ignore[arg-type]
+        simulate_dataset(folder, SceneSettings(preset=preset, seed=0, scenes=scenes), 1)
+        folders[name] = folder  # type: ignore[index]
+    return folders
+
+
+def test_scenes_are_prepared_with_their_parts_and_columns(
+    simulated: dict[PresetName, Path], tmp_path: Path
+) -> None:
+    dataset = prepare_dataset(simulated["cluttered"], tmp_path / "doors", POINTS, workers=1).dataset
+    assert dataset.clouds.shape == (36, POINTS, 3)
+    np.testing.assert_array_equal(dataset.labels, list(range(3)) * 12)
+    assert {Part.WALL, Part.LEAF, Part.OTHER} <= set(
+        np.unique([dataset.parts(n) for n in range(36)]).tolist()
+    )
+    row = dataset.rows[5]
+    assert row["scene_id"] == "cluttered-0-00001"
+    assert float(row["opening_width_m"]) > float(row["passable_width_m"]) > 0
+    assert row["distance_band"] != "outside"
+    np.testing.assert_array_equal(dataset.raw_cloud(5).shape, (60, 80, 3))
+    assert dataset.image(5) is not None
+    assert len(CloudLoader(dataset, [row["sample_id"] for row in dataset.rows], 64)) == 36
+    assert len(draw_splits(dataset.rows, "paper", 0)) == 5
+
+
+def test_scenes_without_a_door_have_a_label_of_their_own_that_no_network_of_three_states_takes(
+    simulated: dict[PresetName, Path], tmp_path: Path
+) -> None:
+    dataset = prepare_dataset(simulated["no-door"], tmp_path / "none", POINTS, workers=1).dataset
+    assert dataset.labels.tolist() == [len(STATES)] * 5
+    with pytest.raises(ConfigError, match="5 samples show no door, such as no-door-0-00000-no_door"):
+        CloudLoader(dataset, [row["sample_id"] for row in dataset.rows], 64)
+
+
+def test_preparation_in_shards_joins_to_the_same_bytes(
+    simulated: dict[PresetName, Path], tmp_path: Path
+) -> None:
+    source = simulated["cluttered"]
+    prepare_dataset(source, tmp_path / "whole", POINTS, workers=1)
+    for number in (2, 1):
+        prepare_shard(source, tmp_path / "shared", Shard(number, 2), POINTS, workers=1)
+    steps: list[tuple[int, int]] = []
+    prepare_dataset(source, tmp_path / "shared", POINTS, workers=1, progress=lambda *step: steps.append(step))
+    assert steps == [(2, 2)]
+    whole, shared = (
+        {path.name: path.read_bytes() for path in (tmp_path / name).iterdir()} for name in ("whole", "shared")
+    )
+    assert whole == shared
+    with pytest.raises(ConfigError, match="something else"):
+        prepare_shard(source, tmp_path / "shared", Shard(1, 2), 128, workers=1)

@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Worlds for Gazebo: read back by another reader, they hold the scene's boxes and give the row's depth."""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import pytest
+
+from doorstate.simulation.frames import replay
+from doorstate.simulation.generate import PRESETS, draw_pose
+from doorstate.simulation.manifest import Row
+from doorstate.simulation.scene import Box
+from doorstate.simulation.scene_rows import SCENE_PRESETS, draw_scene
+from doorstate.simulation.sdf import sdf_world
+from doorstate.simulation.sensor import CameraPose, DepthCamera, cut_range, render_behind_glass
+from doorstate.types import Part
+
+ROWS = [draw_scene(preset, 0, 3)[-1] for preset in SCENE_PRESETS.values()]
+GLASS = next(
+    rows[1]
+    for rows in (draw_scene(SCENE_PRESETS["varied"], 0, index) for index in range(99))
+    if rows[0].door_kind == "full_glass"
+)
+
+
+def numbers(element: ET.Element, path: str) -> list[float]:
+    return [float(word) for word in element.findtext(path, "").split()]
+
+
+def read_boxes(world: ET.Element, kind: str) -> list[Box]:
+    boxes = []
+    for element in world.iterfind(f"model[@name='scene']/link/{kind}"):
+        x, y, z, roll, pitch, yaw = numbers(element, "pose")
+        assert roll == pitch == 0
+        part = Part[element.get("name", "").split("_")[1].upper()]
+        glass = element.find("transparency") is not None
+        size = tuple(numbers(element, "geometry/box/size"))
+        boxes.append(Box(part, (x, y, z), size, yaw, "glass" if glass else "matte"))
+    return boxes
+
+
+def read_camera(world: ET.Element) -> tuple[CameraPose, DepthCamera]:
+    model = world.find("model[@name='depth_camera']")
+    assert model is not None
+    x, y, z, roll, pitch, yaw = numbers(model, "pose")
+    optics = model.find("link/sensor[@type='depth']/camera")
+    assert optics is not None
+    camera = DepthCamera(
+        width=int(optics.findtext("image/width", "")),
+        height=int(optics.findtext("image/height", "")),
+        hfov_deg=math.degrees(float(optics.findtext("horizontal_fov", ""))),
+    )
+    return CameraPose(x, y, z, yaw, pitch, roll), camera
+
+
+@pytest.mark.parametrize(
+    "row", [*ROWS, GLASS, draw_pose(PRESETS["ogurob"], 0, 700)[1]], ids=lambda row: row.sample_id
+)
+def test_a_world_read_back_gives_the_same_boxes_and_the_same_depth(row: Row) -> None:
+    root = ET.fromstring(sdf_world(row, row.sample_id))
+    assert (root.tag, root.get("version")) == ("sdf", "1.7")
+    world = root.find("world")
+    assert world is not None
+    assert world.get("name") == row.sample_id
+    boxes = read_boxes(world, "visual")
+    assert [box._replace(material="matte") for box in boxes] == [
+        box._replace(material="matte") for box in row.boxes()
+    ]
+    assert [box.material == "glass" for box in boxes] == [box.material == "glass" for box in row.boxes()]
+    assert len(read_boxes(world, "collision")) == len(boxes)
+    assert len({element.get("name") for element in world.iter("visual")}) == len(boxes)
+    pose, camera = read_camera(world)
+    assert pose == row.camera_pose()
+    depth = cut_range(render_behind_glass(boxes, pose, camera.intrinsics()), camera).depth_m
+    np.testing.assert_allclose(depth, replay(row).cut.depth_m, atol=1e-6)
