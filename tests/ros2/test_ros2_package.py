@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What can be said of the ROS 2 package without ROS: its files agree with one another, with the node and its README."""
+
+from __future__ import annotations
+
+import ast
+import re
+import runpy
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+import yaml
+
+import doorstate
+from doorstate.deployment.watch import DoorWatch
+from doorstate.deployment.watch_settings import WatchSettings, parse_settings
+
+ROS2 = Path(__file__).resolve().parents[2] / "ros2"
+PACKAGE = ROS2 / "doorstate_ros"
+NODE = (PACKAGE / "doorstate_ros" / "node.py").read_text(encoding="utf-8")
+LAUNCH = PACKAGE / "launch" / "doorstate.launch.py"
+README = (ROS2 / "README.md").read_text(encoding="utf-8")
+MANIFEST = ElementTree.parse(PACKAGE / "package.xml").getroot()
+
+
+@pytest.fixture
+def setup_arguments(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+    seen: dict[str, Any] = {}
+    monkeypatch.chdir(PACKAGE)
+    monkeypatch.setattr("setuptools.setup", lambda **arguments: seen.update(arguments))
+    runpy.run_path("setup.py")
+    return seen
+
+
+def imported(source: str) -> set[str]:
+    """Top-level packages."""
+    found = set()
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.ImportFrom):
+            found.add(str(node.module).partition(".")[0])
+        elif isinstance(node, ast.Import):
+            found |= {alias.name.partition(".")[0] for alias in node.names}
+    return found
+
+
+def strings(source: str) -> Iterator[str]:
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str):
+            yield node.value
+
+
+def test_name_version_and_licence_are_the_same_everywhere(setup_arguments: dict[str, Any]) -> None:
+    for key in ("name", "version", "license", "description", "maintainer"):
+        assert MANIFEST.findtext(key) == setup_arguments[key], key
+    assert setup_arguments["version"] == doorstate.__version__
+    assert MANIFEST.findtext("export/build_type") == "ament_python"
+    assert setup_arguments["packages"] == [setup_arguments["name"]] == [PACKAGE.name]
+    assert f"/lib/{PACKAGE.name}" in (PACKAGE / "setup.cfg").read_text(encoding="utf-8")
+
+
+def test_everything_is_installed_where_ros_looks_for_it(setup_arguments: dict[str, Any]) -> None:
+    installed = {
+        f"{folder}/{Path(file).name}" for folder, files in setup_arguments["data_files"] for file in files
+    }
+    share = f"share/{PACKAGE.name}"
+    wanted = {
+        f"{share}/{folder}/{path.name}"
+        for folder in ("launch", "config")
+        for path in (PACKAGE / folder).iterdir()
+    }
+    assert installed == wanted | {
+        f"{share}/package.xml",
+        f"share/ament_index/resource_index/packages/{PACKAGE.name}",
+    }
+    assert all(Path(file).is_file() for _, files in setup_arguments["data_files"] for file in files)
+
+
+def test_the_entry_point_is_a_function_of_the_node(setup_arguments: dict[str, Any]) -> None:
+    (entry,) = setup_arguments["entry_points"]["console_scripts"]
+    executable, target = entry.split(" = ")
+    assert target == "doorstate_ros.node:main"
+    functions = {node.name for node in ast.parse(NODE).body if isinstance(node, ast.FunctionDef)}
+    assert "main" in functions
+    assert executable in strings(LAUNCH.read_text(encoding="utf-8"))
+    assert f"ros2 run doorstate_ros {executable}" in README
+
+
+def test_what_is_imported_is_declared() -> None:
+    used = imported(NODE) | imported(LAUNCH.read_text(encoding="utf-8"))
+    declared = {element.text for element in MANIFEST.iter("exec_depend")}
+    assert used - set(sys.stdlib_module_names) - {"doorstate"} == declared
+
+
+def test_the_parameter_file_holds_every_parameter_with_its_default() -> None:
+    content = yaml.safe_load((PACKAGE / "config" / "doorstate.yaml").read_text(encoding="utf-8"))
+    given = content["/**"]["ros__parameters"]
+    assert list(given) == list(WatchSettings.model_fields)
+    assert parse_settings(given) == WatchSettings()
+    for name, value in given.items():  # a double that is written as an integer would be one to ROS
+        assert type(value) is type(WatchSettings.model_fields[name].default), name
+
+
+def test_the_readme_lists_every_parameter_with_its_default_and_every_value() -> None:
+    listed = dict(re.findall(r"^\| `(\w+)` \| `([^`]*)` \|", README, flags=re.MULTILINE))
+    defaults = {name: str(field.default) for name, field in WatchSettings.model_fields.items()}
+    shown = {
+        name: value.replace('""', "").replace("true", "True").replace("false", "False")
+        for name, value in listed.items()
+    }
+    assert {name: shown.get(name) for name in defaults} == defaults
+    for name in DoorWatch(WatchSettings(rule="depth_region")).silence(0).values:
+        assert f"`{name}`" in README, name
+
+
+def test_the_launch_file_compiles_and_names_the_topics_of_the_node() -> None:
+    source = LAUNCH.read_text(encoding="utf-8")
+    compile(source, LAUNCH.name, "exec")
+    (topics,) = (
+        ast.literal_eval(node.value)
+        for node in ast.parse(source).body
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "TOPICS"
+    )
+    assert set(topics) == set(WatchSettings.model_fields["input"].annotation.__args__) | {"camera_info"}
+    assert "camera_info" in strings(NODE)
+    assert "config" in strings(source)
+    for topic in topics:
+        assert f"`{topic}`" in README, topic
+
+
+def test_topics_of_the_readme_are_those_of_the_node() -> None:
+    published = {text.removeprefix("~/") for text in strings(NODE) if text.startswith("~/")}
+    assert set(re.findall(r"^\| `~/(\w+)` \|", README, flags=re.MULTILINE)) == published
+
+
+def test_links_of_the_readme_exist() -> None:
+    targets = re.findall(r"\]\(([^)#]+)\)", README)
+    assert targets
+    assert [target for target in targets if "://" not in target and not (ROS2 / target).exists()] == []
+
+
+def test_the_profile_for_large_clouds_holds_one_in_shared_memory() -> None:
+    root = ElementTree.parse(PACKAGE / "config" / "fastdds_large_clouds.xml").getroot()
+    text = {element.tag.partition("}")[2]: element.text for element in root.iter()}
+    largest_cloud = 640 * 480 * 32  # bytes; x, y, z and colour as drivers pad them
+    assert int(text["maxMessageSize"]) > largest_cloud
+    assert int(text["segment_size"]) >= 4 * int(text["maxMessageSize"])
+
+
+def test_without_ros_the_library_is_whole() -> None:
+    code = "import sys; import doorstate.deployment.watch; sys.exit('rclpy' in sys.modules)"
+    subprocess.run([sys.executable, "-c", code], check=True)
