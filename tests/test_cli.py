@@ -35,6 +35,7 @@ COMMANDS = (
     "view",
     "serve",
     "export",
+    "export-sdf",
     "info",
 )
 
