@@ -13,11 +13,15 @@ import torch
 from hypothesis import settings
 
 from doorstate.cli import main
+from doorstate.dataset.join import join_datasets
 from doorstate.dataset.prepare import prepare_dataset
 from doorstate.dataset.store import PreparedDataset
 from doorstate.networks import create_network
 from doorstate.simulation.generate import PRESETS
-from doorstate.simulation.run import SimulationSettings, simulate_dataset
+from doorstate.simulation.run import simulate_dataset
+from doorstate.simulation.scene_rows import SCENE_PRESETS
+from doorstate.simulation.sensor import DepthCamera
+from doorstate.simulation.settings import SceneSettings, SimulationSettings
 from doorstate.training.weights import WeightsCard, save_weights
 
 SMALL_POINTS = 160
@@ -49,6 +53,18 @@ def small_dataset(simulated_folder: Path, tmp_path_factory: pytest.TempPathFacto
     """The same samples with 160 points each."""
     folder = tmp_path_factory.mktemp("prepared") / "small"
     return prepare_dataset(simulated_folder, folder, SMALL_POINTS, workers=1).dataset
+
+
+@pytest.fixture(scope="session")
+def scene_dataset(tmp_path_factory: pytest.TempPathFactory) -> PreparedDataset:
+    """Eight varied doors in three states and twelve scenes without one, 160 points each, seen by a small camera."""
+    folder = tmp_path_factory.mktemp("scenes")
+    camera = DepthCamera(width=160, height=120)
+    for name, scenes in (("varied", 8), ("no-door", 12)):
+        preset = SCENE_PRESETS[name].model_copy(update={"camera": camera})
+        simulate_dataset(folder / name, SceneSettings(preset=preset, seed=4, scenes=scenes), workers=1)
+        prepare_dataset(folder / name, folder / f"{name}-160", SMALL_POINTS, workers=1)
+    return join_datasets([folder / "varied-160", folder / "no-door-160"], folder / "joined")
 
 
 @pytest.fixture(scope="session")

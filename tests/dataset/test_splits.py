@@ -162,8 +162,8 @@ def test_a_damaged_file_of_splits_is_refused(tmp_path: Path, content: str, messa
 
 
 def test_what_cannot_be_split_is_refused() -> None:
-    with pytest.raises(ConfigError, match="no protocol 'by-scene': choose one of paper, by-pose"):
-        draw_splits(ALL, "by-scene", 0)
+    with pytest.raises(ConfigError, match="no protocol 'by-door': choose one of paper, by-pose"):
+        draw_splits(ALL, "by-door", 0)
     with pytest.raises(DatasetError, match="27 samples are too few for 5 folds: at least 30"):
         draw_splits(rows_at(list(range(9))), "paper", 0)
     # Ten neighbours: whichever is tested, all others are too near to learn from.
@@ -180,3 +180,38 @@ def test_a_split_by_pose_needs_every_pose(missing: str) -> None:
     ):
         with pytest.raises(DatasetError, match=rf"{rows[7]['sample_id']} has none \(prepare with --poses\)"):
             draw_splits([*rows[:7], broken, *rows[8:]], "by-pose", 0)
+
+
+def scene_rows(scenes: int) -> list[dict[str, str]]:
+    kinds = ("single", "sliding", "double_equal")
+    return [
+        {
+            "sample_id": f"{scene}-{state}",
+            "scene_id": str(scene),
+            "state": state,
+            "door_kind": kinds[scene % 3],
+            "distance_band": "1.5-2.0",
+            "region": "green",
+        }
+        for scene in range(scenes)
+        for state in STATES
+    ]
+
+
+def test_scenes_stay_together_and_kinds_are_dealt_evenly() -> None:
+    rows = scene_rows(60)
+    splits = draw_splits(rows, "by-scene", 0)
+    for roles in splits:
+        by_scene = {(row["scene_id"], roles[row["sample_id"]]) for row in rows}
+        assert len(by_scene) == 60
+        tested = Counter(row["door_kind"] for row in rows if roles[row["sample_id"]] == "test")
+        assert sum(tested.values()) == 36
+        assert max(tested.values()) - min(tested.values()) <= 3
+    tests = Counter(row["sample_id"] for row in rows for roles in splits if roles[row["sample_id"]] == "test")
+    assert set(tests.values()) == {1}
+
+
+def test_a_split_by_scene_needs_every_scene() -> None:
+    rows = [*scene_rows(20), {"sample_id": "lost", "state": "open"}]
+    with pytest.raises(DatasetError, match="needs the scene of every sample; lost has none"):
+        draw_splits(rows, "by-scene", 0)

@@ -11,11 +11,12 @@ from numpy.testing import assert_allclose
 
 from doorstate.clouds.augment import Augmentation, apply_augmentation, draw_augmentation
 from doorstate.clouds.preparation import SCALE_M
-from doorstate.dataset.targets import Targets, augmented, door_targets
+from doorstate.dataset.targets import Targets, augmented, door_targets, known_parts
 from doorstate.simulation.generate import draw_pose, find_preset
 from doorstate.simulation.manifest import flatten
 
 ROW = {
+    "state": "open",
     "opening_angle_deg": "90.0",
     "hinge": "left",
     "door_x_m": "2.0",
@@ -30,6 +31,7 @@ NOBODY = {"sample_id": "a", "state": "no_door"}
 def test_targets_are_in_the_units_of_the_normalised_cloud() -> None:
     found = door_targets([ROW, NOBODY], np.array([[1.4, 0.2, 0.0], [0.0, 0.0, 0.0]], dtype=np.float32))
     assert {name: values.shape for name, values in found.items()} == {
+        "door": (2, 1),
         "angle": (2, 1),
         "hinge": (2, 1),
         "frame": (2, 3),
@@ -40,6 +42,7 @@ def test_targets_are_in_the_units_of_the_normalised_cloud() -> None:
     assert_allclose(found["frame"][0, :2], [0.6 / SCALE_M, 0.3 / SCALE_M], rtol=1e-6)
     assert abs(found["frame"][0, 2]) == pytest.approx(math.pi)  # the wall's normal comes back at the robot
     assert_allclose(found["widths"][0] * SCALE_M, [0.9, 0.6], rtol=1e-6)
+    assert found.pop("door").tolist() == [[1], [0]]
     assert all(np.isnan(values[1]).all() for values in found.values())
     assert all(values.dtype == np.float32 for values in found.values())
 
@@ -105,4 +108,10 @@ def test_a_mirrored_door_is_hinged_on_the_other_side() -> None:
 def test_what_is_unknown_stays_unknown() -> None:
     unknown = door_targets([NOBODY] * 50, np.zeros((50, 3), dtype=np.float32))
     draw = draw_augmentation(Augmentation(yaw_deg=90, mirror=0.5, shift=0.1), np.random.default_rng(0), 50, 2)
-    assert all(np.isnan(values).all() for values in augmented(unknown, draw).values())
+    moved = augmented(unknown, draw)
+    assert not moved.pop("door").any()
+    assert all(np.isnan(values).all() for values in moved.values())
+
+
+def test_parts_that_nobody_knows_are_negative() -> None:
+    assert known_parts(np.array([[0, 5, 255]], dtype=np.uint8)).tolist() == [[0, 5, -1]]

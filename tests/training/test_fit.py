@@ -326,3 +326,92 @@ def test_compiling_is_an_option_that_falls_back(
     assert (len(calls) > 1) == works
     warned = [record.getMessage() for record in caplog.records if record.name.startswith("doorstate")]
     assert warned == ([] if works else ["torch.compile failed (no C++ compiler): running uncompiled"])
+
+
+@pytest.fixture(scope="module")
+def scene_roles(scene_dataset: PreparedDataset) -> dict[str, Role]:
+    """A fold that validates on doors and tests doors and scenes without one."""
+    without = {row["sample_id"] for row in scene_dataset.rows if row["state"] == "no_door"}
+    for roles in draw_splits(scene_dataset.rows, "by-scene", 0):
+        tested = {sample for sample, role in roles.items() if role == "test"}
+        if (
+            {s for s, role in roles.items() if role == "val"} - without
+            and tested - without
+            and tested & without
+        ):
+            return roles
+    raise AssertionError("no such fold")
+
+
+@pytest.mark.parametrize("network", ["pointnet2", "pointcnn"])
+def test_heads_are_trained_jointly_and_answer_in_metres(
+    network: str, scene_dataset: PreparedDataset, scene_roles: dict[str, Role], tmp_path: Path
+) -> None:
+    heads = ("door", "angle", "hinge", "frame", "widths", *(("parts",) if network == "pointnet2" else ()))
+    recipe = RECIPE.model_copy(update={"epochs": 2, "coarse_to_fine": (Stage(share=0.5, points=128),)})
+    run = config(network=network, heads=heads, recipe=recipe, protocol="by-scene", num_points=160)
+    metrics = fit(run, scene_dataset, scene_roles, tmp_path)
+    tested = [sample for sample, role in scene_roles.items() if role == "test"]
+    answers = read_csv(tmp_path / "answers.csv")
+    assert [row["sample_id"] for row in answers] == tested
+    assert set(answers[0]) == {
+        "sample_id",
+        "p_door",
+        "opening_angle_deg",
+        "p_hinge_left",
+        "door_x_m",
+        "door_y_m",
+        "door_yaw_deg",
+        "opening_width_m",
+        "passable_width_m",
+    }
+    doors = [row["sample_id"] for row in read_csv(tmp_path / "predictions.csv")]
+    assert doors == [s for s in tested if not s.endswith("no_door")]
+    assert 0 < len(doors) < len(tested)
+    assert 0 <= metrics["test_macro_f1"] <= 1
+    if network == "pointnet2":
+        known = sum(int((scene_dataset.parts(scene_dataset.index_of(s)) != 255).sum()) for s in tested)  # type: ignore[union-attr]
+        assert np.sum(metrics["test_part_counts"]) == known
+    loaded, card = load_weights(tmp_path / "weights.safetensors")
+    assert card.heads == heads
+    assert list(loaded.heads) == list(heads)
+
+
+def test_a_run_with_heads_is_another_run(
+    scene_dataset: PreparedDataset, scene_roles: dict[str, Role], tmp_path: Path
+) -> None:
+    run = config(heads=("door", "frame"), recipe=RECIPE.model_copy(update={"epochs": 1}))
+    fit(run, scene_dataset, scene_roles, tmp_path)
+    with pytest.raises(RunError, match="holds a run with another heads"):
+        fit(config(recipe=RECIPE.model_copy(update={"epochs": 1})), scene_dataset, scene_roles, tmp_path)
+
+
+def test_a_run_from_before_heads_is_continued(
+    finished: Path, small_dataset: PreparedDataset, roles: dict[str, Role], tmp_path: Path
+) -> None:
+    stored = json.loads((finished / "config.json").read_text())
+    assert stored.pop("heads") == []
+    for path in finished.iterdir():
+        (tmp_path / path.name).write_bytes(path.read_bytes())
+    (tmp_path / "config.json").write_text(json.dumps(stored))
+    assert fit(config(), small_dataset, roles, tmp_path) == json.loads(
+        (finished / "metrics.json").read_text()
+    )
+
+
+def test_without_the_door_head_scenes_without_a_door_are_refused(
+    scene_dataset: PreparedDataset, scene_roles: dict[str, Role], tmp_path: Path
+) -> None:
+    with pytest.raises(ConfigError, match=r"show no door, .* add the head 'door'"):
+        fit(config(heads=("angle",)), scene_dataset, scene_roles, tmp_path)
+
+
+def test_validation_without_a_door_is_refused(
+    scene_dataset: PreparedDataset, scene_roles: dict[str, Role], tmp_path: Path
+) -> None:
+    doorless = {
+        s: "unused" if r == "val" and not s.endswith("no_door") else r for s, r in scene_roles.items()
+    }
+    doorless |= {row["sample_id"]: "val" for row in scene_dataset.rows[-2:]}
+    with pytest.raises(DatasetError, match="no sample with a door to val"):
+        fit(config(heads=("door",)), scene_dataset, doorless, tmp_path)  # type: ignore[arg-type]

@@ -12,7 +12,8 @@ import sys
 import typer
 
 from doorstate.cli.answers import info, predict
-from doorstate.cli.data import prepare, simulate
+from doorstate.cli.data import join, prepare, simulate
+from doorstate.cli.evaluation import evaluate
 from doorstate.cli.export import export
 from doorstate.cli.resolution import resolution
 from doorstate.cli.service import serve
@@ -33,11 +34,13 @@ app = typer.Typer(
 for command in (
     simulate,
     prepare,
+    join,
     train,
     compare,
     report,
     resolution,
     predict,
+    evaluate,
     view,
     serve,
     export,

@@ -162,3 +162,20 @@ def prepare(
     stdout.print(f"{len(summary.dataset)} clouds of {points} points in {out} ({shares})", soft_wrap=True)
     if summary.rejected:
         raise typer.Exit(1)
+
+
+def join(
+    sources: Annotated[list[Path], typer.Argument(metavar="FOLDER...", help="Prepared data sets.")],
+    out: Annotated[Path, typer.Option(help="Folder to make.")],
+) -> None:
+    """Put prepared data sets behind one another, as one to train on.
+
+    \b
+    Example:
+      doorstate join data/varied-4096 data/cluttered-4096 data/no-door-4096 --out data/mixture-4096
+    """
+    from doorstate.console import out as stdout
+    from doorstate.dataset.join import join_datasets
+
+    joined = join_datasets(sources, out)
+    stdout.print(f"{len(joined)} clouds of {joined.num_points} points in {out}", soft_wrap=True)

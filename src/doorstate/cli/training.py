@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from doorstate.cli.options import Changes, recipe_changes
+from doorstate.cli.options import Changes, Heads, recipe_changes
 
 if TYPE_CHECKING:
     from doorstate.training.comparison import Experiment
@@ -19,11 +19,14 @@ def train(
     data: Annotated[Path, typer.Option(help="A prepared data set.")],
     out: Annotated[Path, typer.Option(help="Folder of the run; a begun run goes on.")],
     fold: Annotated[int, typer.Option(help="Which of the five folds is tested.", min=0, max=4)] = 0,
-    protocol: Annotated[str, typer.Option(help="paper, by-pose or all, which tests nothing.")] = "paper",
+    protocol: Annotated[
+        str, typer.Option(help="paper, by-pose, by-scene, or all, which tests nothing.")
+    ] = "paper",
     points: Annotated[int, typer.Option(help="Points of every cloud.", min=128)] = 4096,
     seed: Annotated[int, typer.Option(min=0)] = 0,
     recipe: Annotated[str, typer.Option(help="common or authors.")] = "common",
     epochs: Annotated[int | None, typer.Option(help="In place of the recipe's.", min=1)] = None,
+    heads: Heads = None,
     changes: Changes = None,
 ) -> None:
     """Train one network on one fold: weights, predictions and metrics in one folder.
@@ -32,6 +35,7 @@ def train(
     Examples:
       doorstate train pointnet2 --data data/ogurob-4096 --points 1024 --epochs 12 --out runs/first
       doorstate train dgcnn --data data/ogurob-4096 --recipe authors --set batch_size=16 --out runs/dgcnn
+      doorstate train pointnet2 --data data/varied --protocol by-scene --heads door,angle,frame --out runs/heads
     """
     from doorstate.console import live_runs
     from doorstate.console import out as stdout
@@ -48,6 +52,7 @@ def train(
         "num_points": points,
         "seed": seed,
         "recipe": recipe,
+        "heads": _names(heads) or (),
         "recipe_changes": recipe_changes(changes, epochs),
     }
     experiment = load_experiment(None, overrides)
@@ -75,7 +80,7 @@ def compare(
         Path | None, typer.Option(help="Folder of the comparison; runs/NAME if not given.")
     ] = None,
     data: Annotated[Path | None, typer.Option(help="A prepared data set.")] = None,
-    protocol: Annotated[str | None, typer.Option(help="paper or by-pose.")] = None,
+    protocol: Annotated[str | None, typer.Option(help="paper, by-pose or by-scene.")] = None,
     networks: Annotated[
         str | None, typer.Option(help="Names, separated by commas; all five if not given.")
     ] = None,
@@ -89,6 +94,7 @@ def compare(
     seed: Annotated[int | None, typer.Option(min=0)] = None,
     recipe: Annotated[str | None, typer.Option(help="common or authors.")] = None,
     epochs: Annotated[int | None, typer.Option(help="In place of the recipe's.", min=1)] = None,
+    heads: Heads = None,
     changes: Changes = None,
     jobs: Annotated[int, typer.Option(help="Runs at the same time.", min=1)] = 1,
 ) -> None:
@@ -113,6 +119,7 @@ def compare(
         "num_points": points,
         "seed": seed,
         "recipe": recipe,
+        "heads": _names(heads),
     }
     overrides = {key: value for key, value in given.items() if value is not None}
     if experiment is None:

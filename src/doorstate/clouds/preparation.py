@@ -90,9 +90,14 @@ def normalize(points: Points) -> Points:
     Returns:
         The same shape, float32, without unit.
     """
-    centroid = points.mean(axis=-2, keepdims=True, dtype=np.float64).astype(np.float32)
-    normalized: Points = (points - centroid) / np.float32(SCALE_M)
+    normalized: Points = (points - centroids(points)[..., None, :]) / np.float32(SCALE_M)
     return normalized
+
+
+def centroids(points: Points) -> Points:
+    """What `normalize` takes from every point: (..., 3) of (..., N, 3), metres."""
+    mean: Points = points.mean(axis=-2, dtype=np.float64).astype(np.float32)
+    return mean
 
 
 def _thinned_pixels(shape: tuple[int, ...], count: int) -> Indices:

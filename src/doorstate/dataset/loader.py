@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -11,8 +12,9 @@ import torch
 from torch import Tensor
 
 from doorstate.clouds.augment import Augmentation, AugmentationDraw, apply_augmentation, draw_augmentation
-from doorstate.clouds.preparation import normalize
+from doorstate.clouds.preparation import centroids, normalize
 from doorstate.dataset.store import PreparedDataset
+from doorstate.dataset.targets import DOOR, NO_STATE, PARTS, augmented, door_targets, known_parts
 from doorstate.errors import ConfigError
 from doorstate.types import DoorState
 
@@ -21,11 +23,12 @@ FindNeighbours = Callable[[Tensor], tuple[Tensor, ...]]
 
 
 class Batch(NamedTuple):
-    """(B, n, 3) float32 normalised points, (B,) int64 labels, and what the loader's search found, if it has one."""
+    """(B, n, 3) float32 normalised points, (B,) int64 labels, what the loader's search found, and targets by head."""
 
     points: Tensor
     labels: Tensor
     neighbourhoods: tuple[Tensor, ...] | None = None
+    targets: Mapping[str, Tensor] = MappingProxyType({})
 
 
 class CloudLoader:
@@ -37,6 +40,7 @@ class CloudLoader:
         sample_ids: Sequence[str],
         num_points: int,
         find_neighbours: FindNeighbours | None = None,
+        heads: Sequence[str] = (),
     ) -> None:
         """Load clouds.
 
@@ -46,9 +50,12 @@ class CloudLoader:
             num_points: of each cloud.
             find_neighbours: done once per cloud, when it is first needed, before any augmentation: give it only with
                 augmentations that leave its result as it is.
+            heads: answers that the batches hold targets for (dataset.targets); with "door" among them samples without
+                one are allowed, and labelled `NO_STATE`.
 
         Raises:
-            ConfigError: more points are asked for than the data set holds, or a sample shows no door.
+            ConfigError: more points are asked for than the data set holds, a sample shows no door, or nobody knows the
+                parts of the points.
         """
         if num_points > dataset.num_points:
             raise ConfigError(
@@ -57,14 +64,20 @@ class CloudLoader:
         indices = np.array([dataset.index_of(sample) for sample in sample_ids], dtype=np.int64)
         self.sample_ids = list(sample_ids)
         # A prefix of a farthest-point order is the farthest-point sample of that size.
-        self._points = normalize(dataset.clouds[indices, :num_points])
-        self._labels = dataset.labels[indices]
-        without = np.flatnonzero(self._labels >= len(DoorState))
-        if len(without):
+        points = dataset.clouds[indices, :num_points]
+        self.centroids = centroids(points)  # (M, 3) metres
+        self._points = normalize(points)
+        self._labels = np.where(dataset.labels[indices] < len(DoorState), dataset.labels[indices], NO_STATE)
+        without = np.flatnonzero(self._labels == NO_STATE)
+        if len(without) and DOOR not in heads:
             raise ConfigError(
                 f"{dataset.folder}: {len(without)} samples show no door, such as {sample_ids[without[0]]}; "
-                "a network of three states can learn nothing from them: take a data set without them"
+                f"a network of three states learns nothing from them: leave them out, or add the head '{DOOR}'"
             )
+        rows = [dataset.rows[index] for index in indices]
+        wanted = door_targets(rows, self.centroids) if heads else {}
+        self._targets = {name: values for name, values in wanted.items() if name in heads}
+        self._parts = dataset.parts_of(indices, num_points) if PARTS in heads else None
         self._neighbours = (
             None if find_neighbours is None else _KnownNeighbours(find_neighbours, self._points)
         )
@@ -95,7 +108,11 @@ class CloudLoader:
         if draw is not None:
             points = apply_augmentation(points, draw)
         known = None if self._neighbours is None else self._neighbours(chosen)
-        return Batch(torch.from_numpy(points), torch.from_numpy(self._labels[chosen]), known)
+        door = {name: values[chosen] for name, values in self._targets.items()}
+        targets = {name: torch.from_numpy(values) for name, values in augmented(door, draw).items()}
+        if self._parts is not None:
+            targets[PARTS] = torch.from_numpy(known_parts(self._parts[chosen]))
+        return Batch(torch.from_numpy(points), torch.from_numpy(self._labels[chosen]), known, targets)
 
 
 class _KnownNeighbours:

@@ -8,6 +8,9 @@
 one sector and the outer block of another. All states of a pose stay together, and poses within 0.5 m of a tested one
 are used by nobody in that fold.
 
+`by-scene`: whole scenes, which is a door in its room and all that was seen of it, stay on one side; dealt by what they
+show and from where.
+
 `all`: one "fold" that trains on every sample and tests none, for weights to be used once a recipe has been chosen.
 """
 
@@ -28,7 +31,7 @@ from doorstate.simulation.manifest import read_csv, write_csv
 Role = Literal["train", "val", "test", "unused"]
 Row = Mapping[str, str]
 EVERYTHING = "all"
-PROTOCOLS = ("paper", "by-pose", EVERYTHING)
+PROTOCOLS = ("paper", "by-pose", "by-scene", EVERYTHING)
 NUM_FOLDS = 5
 EMBARGO_M = 0.5
 _TENTHS = 10
@@ -52,7 +55,7 @@ def draw_splits(rows: Sequence[Row], protocol: str, seed: int) -> list[dict[str,
         raise ConfigError(f"no protocol {protocol!r}: choose one of {', '.join(PROTOCOLS)}")
     if protocol == EVERYTHING:
         return [dict.fromkeys((row["sample_id"] for row in rows), "train")]
-    splits = _paper(rows, seed) if protocol == "paper" else _by_pose(rows, seed)
+    splits = {"paper": _paper, "by-pose": _by_pose, "by-scene": _by_scene}[protocol](rows, seed)
     for fold, roles in enumerate(splits):
         for role in ("train", "val", "test"):
             if role not in roles.values():
@@ -63,7 +66,28 @@ def draw_splits(rows: Sequence[Row], protocol: str, seed: int) -> list[dict[str,
 
 
 def _paper(rows: Sequence[Row], seed: int) -> list[dict[str, Role]]:
-    tenth = _deal([(row["state"], row.get("distance_band", ""), row.get("region", "")) for row in rows], seed)
+    tenths = _deal(
+        [(row["state"], row.get("distance_band", ""), row.get("region", "")) for row in rows], seed
+    )
+    return _roles(rows, tenths)
+
+
+def _by_scene(rows: Sequence[Row], seed: int) -> list[dict[str, Role]]:
+    scenes: dict[str, tuple[str, ...]] = {}
+    for row in rows:
+        if not row.get("scene_id"):
+            raise DatasetError(
+                f"protocol by-scene needs the scene of every sample; {row['sample_id']} has none "
+                "(simulate a preset of many scenes)"
+            )
+        kind = row.get("door_kind") or row.get("scene_kind", "")
+        scenes[row["scene_id"]] = (kind, row.get("distance_band", ""), row.get("region", ""))
+    tenth = dict(zip(scenes, _deal(list(scenes.values()), seed), strict=True))
+    return _roles(rows, [tenth[row["scene_id"]] for row in rows])
+
+
+def _roles(rows: Sequence[Row], tenths: Sequence[int]) -> list[dict[str, Role]]:
+    """Roles in every fold of samples that were dealt into tenths: two are tested, one validates."""
     roles: list[dict[str, Role]] = []
     for fold in range(NUM_FOLDS):
         test = {2 * fold, 2 * fold + 1}
@@ -71,7 +95,7 @@ def _paper(rows: Sequence[Row], seed: int) -> list[dict[str, Role]]:
         roles.append(
             {
                 row["sample_id"]: "test" if part in test else "val" if part == val else "train"
-                for row, part in zip(rows, tenth, strict=True)
+                for row, part in zip(rows, tenths, strict=True)
             }
         )
     return roles

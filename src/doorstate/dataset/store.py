@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from doorstate.dataset.sampled import sample_frame
-from doorstate.errors import DatasetError
+from doorstate.errors import ConfigError, DatasetError
 from doorstate.files import write_text
 from doorstate.simulation.generate import replay
 from doorstate.simulation.manifest import read_csv, unflatten
 from doorstate.simulation.shading import shade
-from doorstate.types import NO_DOOR, STATES, Points
+from doorstate.types import NO_DOOR, STATES, Indices, Points
 
 MANIFEST, CLOUDS, PARTS, DESCRIPTION = "manifest.csv", "clouds.npy", "parts.npy", "dataset.json"
 _LABELS = (*STATES, NO_DOOR)
@@ -115,6 +115,21 @@ class PreparedDataset:
         if self._clouds is None:
             return self._make(index, num_points)[1].copy()
         return None if self._parts is None else np.array(self._parts[index, :num_points])
+
+    @property
+    def knows_parts(self) -> bool:
+        """Whether the parts of all points are stored."""
+        return self._parts is not None
+
+    def parts_of(self, indices: Indices, num_points: int) -> NDArray[np.uint8]:
+        """(M, n) parts of the first points of samples by number.
+
+        Raises:
+            ConfigError: nobody knows them, or only rows are stored.
+        """
+        if self._parts is None:
+            raise ConfigError(f"{self.folder}: holds no parts of points: leave out the head 'parts'")
+        return np.array(self._parts[indices, :num_points])
 
     def _make(self, index: int, num_points: int | None) -> tuple[Points, NDArray[np.uint8]]:
         count = num_points or self.num_points

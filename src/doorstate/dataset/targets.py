@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the manifest knows of a door, in the units and axes that a network sees; NaN where it does not know.
 
-The same four answers as `networks.heads`: opening angle, hinge side, frame pose, widths.
+The same answers as `networks.heads`: whether there is a door, its opening angle, hinge side, frame pose and widths, and
+the parts of the points.
 """
 
 from __future__ import annotations
@@ -14,11 +15,14 @@ from numpy.typing import NDArray
 
 from doorstate.clouds.augment import AugmentationDraw
 from doorstate.clouds.preparation import SCALE_M
-from doorstate.types import Points
+from doorstate.types import NO_DOOR, Part, Points
 
 Targets = dict[str, NDArray[np.float32]]
-"""By answer: "angle" (M, 1) radians, "hinge" (M, 1) 1 left and 0 right, "frame" (M, 3), "widths" (M, 2)."""
+"""By answer: "door" (M, 1) 1 or 0, "angle" (M, 1) radians, "hinge" (M, 1) 1 left and 0 right, "frame" (M, 3), "widths"
+(M, 2)."""
 
+DOOR, PARTS = "door", "parts"
+NO_STATE = -100  # label of a sample without a door: torch's cross entropy passes it over
 _HINGE = {"left": 1.0, "right": 0.0}
 
 
@@ -39,6 +43,7 @@ def door_targets(rows: Sequence[Mapping[str, str]], centroids: Points) -> Target
         axis=1,
     )
     found = {
+        DOOR: np.array([[float(row["state"] != NO_DOOR)] for row in rows]),
         "angle": angle[:, None],
         "hinge": np.array(hinge)[:, None],
         "frame": np.column_stack([place / SCALE_M, np.arctan2(np.sin(normal), np.cos(normal))]),
@@ -47,22 +52,31 @@ def door_targets(rows: Sequence[Mapping[str, str]], centroids: Points) -> Target
     return {name: values.astype(np.float32) for name, values in found.items()}
 
 
-def augmented(targets: Targets, draw: AugmentationDraw) -> Targets:
-    """Targets of clouds that were changed by a draw: turned, mirrored, scaled and moved with them."""
+def known_parts(parts: NDArray[np.uint8]) -> NDArray[np.int64]:
+    """Parts of points as a network's targets: -1 where nobody knows."""
+    return np.where(parts == Part.NONE, -1, parts.astype(np.int64))
+
+
+def augmented(targets: Targets, draw: AugmentationDraw | None) -> Targets:
+    """Targets, all or some, of clouds that were changed by a draw: turned, mirrored, scaled and moved with them."""
+    if draw is None or not targets:
+        return targets
     plan = draw.linear[:, :2, :2].astype(
         np.float64
     )  # a tilt of a few degrees moves a door by less than its leaf
     determinant = np.linalg.det(plan)
     scale = np.sqrt(np.abs(determinant))[:, None]
-    frame = targets["frame"]
-    normal = np.stack([np.cos(frame[:, 2]), np.sin(frame[:, 2])], axis=1)
-    place, normal = ((plan @ vector[:, :, None])[:, :, 0] for vector in (frame[:, :2], normal))
-    changed = {
-        "angle": targets["angle"],
-        "hinge": np.where(determinant[:, None] < 0, 1 - targets["hinge"], targets["hinge"]),
-        "frame": np.column_stack([place + draw.shift[:, 0, :2], np.arctan2(normal[:, 1], normal[:, 0])]),
-        "widths": targets["widths"] * scale,
-    }
+    changed = dict(targets)
+    if "hinge" in targets:
+        changed["hinge"] = np.where(determinant[:, None] < 0, 1 - targets["hinge"], targets["hinge"])
+    if "widths" in targets:
+        changed["widths"] = targets["widths"] * scale
+    if "frame" in targets:
+        frame = targets["frame"]
+        normal = np.stack([np.cos(frame[:, 2]), np.sin(frame[:, 2])], axis=1)
+        place, normal = ((plan @ vector[:, :, None])[:, :, 0] for vector in (frame[:, :2], normal))
+        yaw = np.arctan2(normal[:, 1], normal[:, 0])
+        changed["frame"] = np.column_stack([place + draw.shift[:, 0, :2], yaw])
     return {name: values.astype(np.float32) for name, values in changed.items()}
 
 

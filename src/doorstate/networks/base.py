@@ -36,6 +36,8 @@ class PointNetwork(nn.Module, ABC):
     """Fewest points per cloud."""
     neighbours_keep_under_scale: bool = True
     """Whether `neighbourhoods` of a cloud stay the same when it is scaled; they always do when it is turned."""
+    has_point_features: bool = False
+    """Whether the network has a per-point branch (`part_branch`)."""
     feature_size: int
     """Channels of `features`."""
     head: nn.Module
@@ -107,7 +109,7 @@ class PointNetwork(nn.Module, ABC):
 
         Args:
             points: (B, N, 3) as in `forward`.
-            labels: (B,) int64 classes.
+            labels: (B,) int64 classes; -100 is passed over.
             label_smoothing: eps of 1 - eps + eps/C for the true class and eps/C for each other of C classes.
                 (The 1 - eps and eps/(C - 1) of DGCNN's authors is the same with eps * C/(C - 1).)
             neighbourhoods: as in `forward`.

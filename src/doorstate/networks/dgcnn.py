@@ -92,6 +92,7 @@ class DGCNN(PointNetwork):
     """
 
     feature_size = 2048
+    has_point_features = True
 
     def __init__(self, num_classes: int = 3, *, k: int | None = None, batchnorm_eps: float = 1e-5) -> None:
         super().__init__()

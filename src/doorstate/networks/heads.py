@@ -54,6 +54,22 @@ class Head(nn.Module, ABC):
         """(B,) losses of (B, outputs) against (B, answers) without NaN."""
 
 
+class YesNo(Head):
+    """A probability; the target is 0 or 1."""
+
+    outputs, answers = 1, 1
+
+    def decode(self, outputs: Tensor) -> Tensor:
+        return outputs.sigmoid()
+
+    def losses(self, outputs: Tensor, target: Tensor) -> Tensor:
+        return functional.binary_cross_entropy_with_logits(outputs, target, reduction="none").squeeze(1)
+
+
+class DoorPresence(YesNo):
+    """Probability that there is a door. What the network's own head says is of a door."""
+
+
 class OpeningAngle(Head):
     """Opening angle in radians, as a direction in the plane, so that no angle is far from its neighbour."""
 
@@ -67,16 +83,8 @@ class OpeningAngle(Head):
         return _distance(outputs, direction)
 
 
-class HingeSide(Head):
-    """Probability that the hinge is on the left, as seen from the camera; the target is 0 or 1."""
-
-    outputs, answers = 1, 1
-
-    def decode(self, outputs: Tensor) -> Tensor:
-        return outputs.sigmoid()
-
-    def losses(self, outputs: Tensor, target: Tensor) -> Tensor:
-        return functional.binary_cross_entropy_with_logits(outputs, target, reduction="none").squeeze(1)
+class HingeSide(YesNo):
+    """Probability that the hinge is on the left, as seen from the camera."""
 
 
 class FramePose(Head):
@@ -108,6 +116,7 @@ _POSITION = 3.0  # per unit of the normalised cloud: losses of lengths are in me
 
 
 HEADS: dict[str, type[Head]] = {
+    "door": DoorPresence,
     "angle": OpeningAngle,
     "hinge": HingeSide,
     "frame": FramePose,
@@ -179,7 +188,7 @@ def joint_losses(
     Args:
         network: with heads.
         points: (B, N, 3) as in `PointNetwork.forward`.
-        labels: (B,) int64 states.
+        labels: (B,) int64 states, -100 where there is no door.
         targets: by head; "parts" (B, N) int64, negative where unknown.
         label_smoothing: of the state.
         neighbourhoods: as in `PointNetwork.forward`.
@@ -190,7 +199,8 @@ def joint_losses(
     network.check(points)
     encoding = network.encode(points, neighbourhoods)
     loss, logits = network.loss_of(encoding, labels, label_smoothing)
-    losses = {STATE: loss}
+    # A mean over no doors at all is no number.
+    losses = {STATE: loss if (labels >= 0).any() else logits.sum() * 0}
     for name, head in network.heads.items():
         target = targets[name]
         if not isinstance(head, Head):

@@ -65,6 +65,7 @@ class PointNet(PointNetwork):
     """
 
     feature_size = 1024
+    has_point_features = True
 
     def __init__(
         self, num_classes: int = 3, *, regularizer_weight: float = 0.001, batchnorm_eps: float = 1e-5

@@ -142,6 +142,7 @@ class PointNet2(PointNetwork):
     """
 
     feature_size = 1024
+    has_point_features = True
     neighbours_keep_under_scale = False  # a ball keeps its radius
 
     def __init__(

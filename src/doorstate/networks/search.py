@@ -143,7 +143,9 @@ def _nearest_of_all(query: Tensor, points: Tensor, k: int) -> Tensor:
     for start in range(0, query.shape[1], block_size):
         block = query[:, start : start + block_size]
         distances = find_distances(block, points)  # (B, m, N)
-        twins = points[:, start : start + block.shape[1]]  # fewer, or none, where there are more queries than points
+        twins = points[
+            :, start : start + block.shape[1]
+        ]  # fewer, or none, where there are more queries than points
         same = (block[:, : twins.shape[1]] == twins).all(-1, keepdim=True)  # (B, m, 1)
         same_index = torch.arange(start, start + twins.shape[1], device=points.device)  # (m,)
         column = same_index.view(1, -1, 1).expand_as(same)

@@ -18,6 +18,7 @@ class WeightsCard(BaseModel):
     network: str
     network_options: dict[str, object] = {}
     num_points: int
+    heads: tuple[str, ...] = ()  # answers besides the state
     scale_m: float = SCALE_M
     states: tuple[str, ...] = STATES
     temperature: float = Field(default=1.0, gt=0)  # logits are divided by it (training.calibration)

@@ -16,6 +16,7 @@ from doorstate.dataset.store import PreparedDataset, open_dataset
 from doorstate.errors import ConfigError, RunError
 from doorstate.jobs import Progress, default_workers, no_progress, run_pieces
 from doorstate.networks import create_network, list_networks
+from doorstate.networks.heads import PARTS, give_heads
 from doorstate.rules import create_rule
 from doorstate.training.fit import RunConfig, fit, threads
 from doorstate.training.recipes import Recipe, find_recipe
@@ -41,6 +42,7 @@ class Experiment(BaseModel):
     network_changes: dict[str, dict[str, Any]] = {}  # for one network, over recipe_changes
     # A comparison whose weights of the same network and fold the runs go on from.
     start_from: str | None = None
+    heads: tuple[str, ...] = ()  # answers besides the state, trained jointly
 
     def recipe_of(self, network: str) -> Recipe:
         """The recipe of a network, changes applied.
@@ -54,6 +56,11 @@ class Experiment(BaseModel):
             return Recipe.model_validate(recipe.model_dump() | changes)
         except ValidationError as error:
             raise ConfigError(f"experiment {self.name}: recipe_changes: {first_problem(error)}") from error
+
+    def heads_of(self, network: str) -> tuple[str, ...]:
+        """The heads of a network: all, but "parts" only where it has features of single points."""
+        able = create_network(network).has_point_features
+        return tuple(name for name in self.heads if able or name != PARTS)
 
     @property
     def methods(self) -> tuple[str, ...]:
@@ -69,7 +76,7 @@ class Experiment(BaseModel):
         if unknown := sorted(set(self.network_changes) - set(list_networks())):
             raise ConfigError(f"experiment {self.name}: network_changes: no network {unknown[0]!r}")
         for network in self.networks:
-            create_network(network)
+            give_heads(create_network(network), self.heads_of(network))
             self.recipe_of(network)
         for rule in self.rules:
             create_rule(rule)
@@ -171,7 +178,7 @@ def prepare_comparison(experiment: Experiment, folder: Path) -> None:
         | {network: experiment.recipe_of(network).model_dump(mode="json") for network in experiment.networks}
     }
     if path.is_file():
-        found = {"rules": []} | read_json(path)  # a folder may be older than rules
+        found = {"rules": [], "heads": []} | read_json(path)  # a folder may be older than rules and heads
         changed = sorted(key for key in {*found, *settings} if found.get(key) != settings.get(key))
         if changed:
             raise RunError(
@@ -207,6 +214,7 @@ def train_one(
         start_from=None
         if experiment.start_from is None
         else str(run_of(Path(experiment.start_from), network, fold).weights),
+        heads=experiment.heads_of(network),
     )
     return fit(config, dataset, splits[fold], folder)
 

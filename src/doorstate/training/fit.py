@@ -10,8 +10,10 @@ from __future__ import annotations
 import logging
 import math
 import time
-from collections.abc import Iterator, Mapping
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,22 +22,26 @@ import numpy as np
 import torch
 from pydantic import BaseModel, ConfigDict
 from sklearn.metrics import accuracy_score, f1_score
+from torch import Tensor
 from torch.nn import functional
 
 from doorstate.dataset.loader import Batch, CloudLoader
 from doorstate.dataset.splits import Role
 from doorstate.dataset.store import PreparedDataset
+from doorstate.dataset.targets import NO_STATE
 from doorstate.errors import ConfigError, DatasetError, RunError, WeightsError
 from doorstate.files import atomic_path
 from doorstate.networks import create_network
 from doorstate.networks.base import PointNetwork
+from doorstate.networks.heads import PARTS, STATE, answers, give_heads, joint_losses
 from doorstate.networks.layers import set_batchnorm
+from doorstate.training.answers import in_metres, write_answers
 from doorstate.training.card import WeightsCard
 from doorstate.training.environment import bf16_is_quick, compiled, describe_environment, keep_freed_memory
 from doorstate.training.recipes import Recipe, batchnorm_momentum, learning_rate, resolution_of_epoch
 from doorstate.training.run_folder import RunFolder, write_predictions
 from doorstate.training.weights import load_into, read_card, save_weights
-from doorstate.types import STATES
+from doorstate.types import NO_DOOR, STATES, Part
 
 _EVALUATION_BATCH = 32
 _TELL_EVERY_S = 1.0
@@ -56,30 +62,34 @@ class RunConfig(BaseModel):
     seed: int
     recipe: Recipe
     start_from: str | None = None  # a weights file to go on from
+    heads: tuple[str, ...] = ()  # answers besides the state (networks.heads)
 
 
 class Evaluation(NamedTuple):
-    """Mean loss and class probabilities (M, 3) of samples in order."""
+    """Mean loss and class probabilities (M, 3) of samples in order, and what further heads say."""
 
     loss: float
     probabilities: np.ndarray
     labels: np.ndarray
+    answers: dict[str, np.ndarray]  # by head, (M, answers), in the network's units
+    part_counts: np.ndarray | None  # (parts, parts) points by true and predicted part
+
+    @property
+    def doors(self) -> np.ndarray:
+        """(M,) whether the sample has a state."""
+        doors: np.ndarray = self.labels != NO_STATE
+        return doors
 
     @property
     def macro_f1(self) -> float:
-        return float(
-            f1_score(
-                self.labels,
-                self.probabilities.argmax(1),
-                labels=range(len(STATES)),
-                average="macro",
-                zero_division=0,
-            )
-        )
+        return float(f1_score(*self._of_doors(), labels=range(len(STATES)), average="macro", zero_division=0))
 
     @property
     def accuracy(self) -> float:
-        return float(accuracy_score(self.labels, self.probabilities.argmax(1)))
+        return float(accuracy_score(*self._of_doors()))
+
+    def _of_doors(self) -> tuple[np.ndarray, np.ndarray]:
+        return self.labels[self.doors], self.probabilities.argmax(1)[self.doors]
 
 
 def fit(
@@ -109,7 +119,7 @@ def fit(
     run.claim(config.model_dump(mode="json"), describe_environment())
     if run.finished:
         return run.read_metrics()
-    samples = _samples(roles)
+    samples = _samples(roles, dataset)
     keep_freed_memory()
     logging.getLogger("lightning_fabric").setLevel(logging.WARNING)  # it announces every run's precision
     fabric = lightning_fabric.Fabric(accelerator="auto", devices=1, precision=_precision(config.recipe))
@@ -129,15 +139,31 @@ def fit(
 def evaluate(network: PointNetwork, loader: CloudLoader, fabric: lightning_fabric.Fabric) -> Evaluation:
     """Run a network over all samples of a loader."""
     network.eval()
-    logits, labels = [], []
+    found: defaultdict[str, list[Tensor]] = defaultdict(list)
+    part_counts = None
     for batch in loader.in_order(_EVALUATION_BATCH):
         on_device = fabric.to_device(batch)
         with fabric.autocast():
-            logits.append(network(on_device.points, on_device.neighbourhoods).float().cpu())
-        labels.append(batch.labels)
-    all_logits, all_labels = torch.cat(logits), torch.cat(labels)
-    loss = functional.cross_entropy(all_logits, all_labels).item()
-    return Evaluation(loss, all_logits.softmax(1).numpy(), all_labels.numpy())
+            said = answers(network, on_device.points, on_device.neighbourhoods)
+        if PARTS in said:
+            counts = confusion_counts(batch.targets[PARTS], said.pop(PARTS).argmax(-1).cpu())
+            part_counts = counts if part_counts is None else part_counts + counts
+        for name, values in said.items():
+            found[name].append(values.float().cpu())
+        found["labels"].append(batch.labels)
+    joined = {name: torch.cat(values) for name, values in found.items()}
+    logits, labels = joined.pop(STATE), joined.pop("labels")
+    loss = functional.cross_entropy(logits, labels, ignore_index=NO_STATE).item()
+    others = {name: values.numpy() for name, values in joined.items()}
+    return Evaluation(loss, logits.softmax(1).numpy(), labels.numpy(), others, part_counts)
+
+
+def confusion_counts(parts: Tensor, said: Tensor) -> np.ndarray:
+    """(parts, parts) points by true and predicted part; those of unknown part, negative, are left out."""
+    size = len(Part) - 1
+    known = parts >= 0
+    counts = torch.bincount(parts[known] * size + said[known], minlength=size**2)
+    return counts.view(size, size).numpy()
 
 
 class _Begun(NamedTuple):
@@ -160,8 +186,11 @@ class _Trainer:
         self.config, self.fabric, self.run = config, fabric, run
         self.dataset, self.samples = dataset, samples
         self.network = network.to(fabric.device)
-        loss = self.network.training_loss
-        self.training_loss = compiled(loss) if config.recipe.compile else loss
+        self.state_loss = network.training_loss
+        self.joint_losses: Callable[..., tuple[dict[str, Tensor], Tensor]] = partial(joint_losses, network)
+        if config.recipe.compile:
+            self.state_loss = compiled(self.state_loss)
+            self.joint_losses = compiled(self.joint_losses)
         self.optimizer = _optimizer(config.recipe, network)
         self.log: list[dict[str, float]] = []
         self.best: tuple[float, float] = (-1.0, -math.inf)
@@ -183,8 +212,10 @@ class _Trainer:
                 self.network.use_centres(resolution.centres)
                 search = self.network.neighbourhoods
                 kept = search if self._neighbours_keep() else None
-                loader = CloudLoader(self.dataset, self.samples["train"], resolution.points, kept)
-                validation = CloudLoader(self.dataset, self.samples["val"], resolution.points, search)
+                loader, validation = (
+                    CloudLoader(self.dataset, self.samples[role], resolution.points, find, self.config.heads)
+                    for role, find in (("train", kept), ("val", search))
+                )
             rate, loss = self._epoch(epoch, loader)
             line = {
                 "epoch": epoch,
@@ -218,10 +249,15 @@ class _Trainer:
         for role, path in (("val", self.run.validation), ("test", self.run.predictions)):
             samples = self.samples[role]
             if samples:
-                loader = CloudLoader(self.dataset, samples, self.config.num_points)
+                loader = CloudLoader(self.dataset, samples, self.config.num_points, heads=self.config.heads)
                 found = evaluate(self.network, loader, self.fabric)
-                write_predictions(path, samples, found.labels, found.probabilities)
+                doors = [sample for sample, door in zip(samples, found.doors, strict=True) if door]
+                write_predictions(path, doors, found.labels[found.doors], found.probabilities[found.doors])
                 metrics |= {f"{role}_macro_f1": found.macro_f1, f"{role}_accuracy": found.accuracy}
+                if role == "test" and found.answers:
+                    write_answers(self.run.answers, samples, in_metres(found.answers, loader.centroids))
+                if role == "test" and found.part_counts is not None:
+                    metrics["test_part_counts"] = found.part_counts.tolist()
         return metrics
 
     def _epoch(self, epoch: int, loader: CloudLoader) -> tuple[float, float]:
@@ -268,7 +304,13 @@ class _Trainer:
         self.optimizer.zero_grad(set_to_none=True)
         smoothing = self.config.recipe.label_smoothing
         with self.fabric.autocast():
-            loss, _ = self.training_loss(batch.points, batch.labels, smoothing, batch.neighbourhoods)
+            if self.config.heads:
+                losses, _ = self.joint_losses(
+                    batch.points, batch.labels, batch.targets, smoothing, batch.neighbourhoods
+                )
+                loss = torch.stack(list(losses.values())).sum()
+            else:
+                loss, _ = self.state_loss(batch.points, batch.labels, smoothing, batch.neighbourhoods)
         loss.backward()  # type: ignore[no-untyped-call]
         if self.config.recipe.gradient_clip is not None:
             torch.nn.utils.clip_grad_norm_(self.network.parameters(), self.config.recipe.gradient_clip)
@@ -309,12 +351,15 @@ class _Trainer:
             network=config.network,
             network_options=_network_options(config),
             num_points=config.num_points,
+            heads=config.heads,
             trained_on=f"{self.dataset.description.source}, protocol {config.protocol}, fold {config.fold}",
         )
 
 
 def _build(config: RunConfig) -> PointNetwork:
-    return create_network(config.network, len(STATES), **_network_options(config))
+    network = create_network(config.network, len(STATES), **_network_options(config))
+    give_heads(network, config.heads)
+    return network
 
 
 def _start_from(network: PointNetwork, config: RunConfig) -> None:
@@ -324,6 +369,8 @@ def _start_from(network: PointNetwork, config: RunConfig) -> None:
         raise WeightsError(
             f"{path}: is for {card.network} {card.network_options or ''}, not {config.network}"
         )
+    if card.heads != config.heads:
+        raise WeightsError(f"{path}: has the heads {card.heads or 'none'}, not {config.heads or 'none'}")
     load_into(network, path)
 
 
@@ -351,7 +398,7 @@ def _seed(config: RunConfig, epoch: int) -> int:
     return int(np.random.SeedSequence([config.seed, config.fold, epoch]).generate_state(1)[0])
 
 
-def _samples(roles: Mapping[str, Role]) -> dict[str, list[str]]:
+def _samples(roles: Mapping[str, Role], dataset: PreparedDataset) -> dict[str, list[str]]:
     samples: dict[str, list[str]] = {"train": [], "val": [], "test": [], "unused": []}
     for sample, role in roles.items():
         samples[role].append(sample)
@@ -362,6 +409,8 @@ def _samples(roles: Mapping[str, Role]) -> dict[str, list[str]]:
             raise DatasetError(
                 f"only {len(samples[role])} samples for {role}: the data set is too small for this split"
             )
+        if all(dataset.rows[dataset.index_of(sample)]["state"] == NO_DOOR for sample in samples[role]):
+            raise DatasetError(f"no sample with a door to {role}: the data set is too small for this split")
     return samples
 
 

@@ -15,6 +15,8 @@ from doorstate.files import write_text
 from doorstate.simulation.manifest import read_csv, write_csv
 from doorstate.types import STATES
 
+_SINCE: dict[str, Any] = {"heads": []}  # of configurations: what older folders do not know
+
 
 class RunFolder:
     """One run on disk; it is finished once `metrics.json` is there."""
@@ -29,6 +31,7 @@ class RunFolder:
         self.weights = path / "weights.safetensors"
         self.predictions = path / "predictions.csv"
         self.validation = path / "validation.csv"  # the same of the samples that the epoch was chosen on
+        self.answers = path / "answers.csv"  # of further heads, to all test samples
         self.found = path / "found.jsonl"  # what a rule found in samples that it did not get right
         self.metrics = path / "metrics.json"
 
@@ -43,7 +46,8 @@ class RunFolder:
             RunError: the folder holds another run.
         """
         if self.config.is_file():
-            found = read_json(self.config)
+            added = {key: value for key, value in _SINCE.items() if key in config}
+            found = added | read_json(self.config)
             if found != config:
                 changed = sorted(key for key in {*found, *config} if found.get(key) != config.get(key))
                 raise RunError(

@@ -16,6 +16,7 @@ from doorstate.errors import WeightsError
 from doorstate.files import atomic_path
 from doorstate.networks import create_network
 from doorstate.networks.base import PointNetwork
+from doorstate.networks.heads import give_heads
 from doorstate.training.card import WeightsCard
 from doorstate.types import STATES
 
@@ -61,6 +62,7 @@ def load_weights(path: Path) -> tuple[PointNetwork, WeightsCard]:
         raise WeightsError(f"{path}: made for states {card.states} at scale {card.scale_m} m")
     try:
         network = create_network(card.network, len(card.states), **card.network_options)
+        give_heads(network, card.heads)
         load_into(network, path)
     except RuntimeError as error:
         raise WeightsError(

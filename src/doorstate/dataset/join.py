@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Several prepared data sets as one: what weights for the real world are trained on."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from doorstate import __version__
+from doorstate.dataset.store import (
+    CLOUDS,
+    MANIFEST,
+    PARTS,
+    DatasetDescription,
+    PreparedDataset,
+    open_dataset,
+)
+from doorstate.errors import ConfigError, DatasetError
+from doorstate.files import atomic_path, is_vacant
+from doorstate.simulation.manifest import write_csv
+
+
+def join_datasets(sources: Sequence[Path], folder: Path) -> PreparedDataset:
+    """Write the samples of prepared data sets behind one another; parts of points if all of them know theirs.
+
+    Raises:
+        ConfigError: the folder is not empty, or the data sets have clouds of different sizes.
+        DatasetError: one cannot be opened, or two hold a sample of the same name.
+    """
+    if not is_vacant(folder):
+        raise ConfigError(f"{folder}: exists and holds something; choose another folder")
+    parts = [open_dataset(source) for source in sources]
+    num_points = parts[0].num_points
+    for source, part in zip(sources, parts, strict=True):
+        if part.num_points != num_points:
+            raise ConfigError(
+                f"{source}: has {part.num_points} points a cloud, {sources[0]} has {num_points}; prepare one anew"
+            )
+    rows = [row for part in parts for row in part.rows]
+    name, count = Counter(row["sample_id"] for row in rows).most_common(1)[0]
+    if count > 1:
+        raise DatasetError(f"sample {name!r} is there {count} times; simulate with different seeds")
+    folder.mkdir(parents=True, exist_ok=True)
+    _stack(folder / CLOUDS, [part.clouds for part in parts])
+    if all(part.knows_parts for part in parts):
+        every = [part.parts_of(np.arange(len(part)), num_points) for part in parts]
+        _stack(folder / PARTS, every)
+    write_csv(folder / MANIFEST, rows)
+    kinds = {part.description.kind for part in parts}
+    DatasetDescription(
+        kind="simulated" if kinds == {"simulated"} else "imported",
+        source=" + ".join(part.description.source for part in parts),
+        num_points=num_points,
+        samples=len(rows),
+        doorstate_version=__version__,
+    ).save(folder)
+    return open_dataset(folder)
+
+
+def _stack(target: Path, arrays: Sequence[np.ndarray]) -> None:
+    shape = (sum(len(array) for array in arrays), *arrays[0].shape[1:])
+    with atomic_path(target) as temporary:
+        whole = np.lib.format.open_memmap(temporary, mode="w+", dtype=arrays[0].dtype, shape=shape)
+        np.concatenate(arrays, out=whole)
+        whole.flush()
+        del whole

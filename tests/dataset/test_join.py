@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Joined data sets hold every sample of their parts, to the bit."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from doorstate.dataset.join import join_datasets
+from doorstate.dataset.store import PARTS, PreparedDataset, open_dataset
+from doorstate.errors import ConfigError, DatasetError
+
+
+def test_every_sample_is_there_with_its_cloud_and_parts(scene_dataset: PreparedDataset) -> None:
+    folder = scene_dataset.folder.parent
+    start = 0
+    for name in ("varied-160", "no-door-160"):
+        part = open_dataset(folder / name)
+        stop = start + len(part)
+        assert np.array_equal(scene_dataset.clouds[start:stop], part.clouds)
+        assert [row["sample_id"] for row in scene_dataset.rows[start:stop]] == [
+            r["sample_id"] for r in part.rows
+        ]
+        for number in (0, len(part) - 1):
+            assert np.array_equal(scene_dataset.parts(start + number), part.parts(number))
+        start = stop
+    assert len(scene_dataset) == start == 36
+    assert scene_dataset.description.source == "varied + no-door"
+
+
+def test_a_joined_sample_is_rendered_again_from_its_row(scene_dataset: PreparedDataset) -> None:
+    for index in (1, 30):
+        raw = scene_dataset.raw_cloud(index)
+        kept = scene_dataset.cloud(index)
+        assert {tuple(p) for p in kept.tolist()} <= {tuple(p) for p in raw.reshape(-1, 3).tolist()}
+
+
+def test_parts_are_left_out_where_one_does_not_know_them(
+    scene_dataset: PreparedDataset, tmp_path: Path
+) -> None:
+    folder = scene_dataset.folder.parent
+    shutil.copytree(folder / "no-door-160", tmp_path / "blind")
+    (tmp_path / "blind" / PARTS).unlink()
+    joined = join_datasets([folder / "varied-160", tmp_path / "blind"], tmp_path / "joined")
+    assert not joined.knows_parts
+    assert len(joined) == 36
+
+
+def test_what_cannot_be_joined_is_refused(
+    scene_dataset: PreparedDataset, prepared: Path, tmp_path: Path
+) -> None:
+    varied = scene_dataset.folder.parent / "varied-160"
+    with pytest.raises(DatasetError, match="is there 2 times"):
+        join_datasets([varied, varied], tmp_path / "a")
+    with pytest.raises(ConfigError, match=r"has 40 points a cloud, .* has 160"):
+        join_datasets([varied, prepared], tmp_path / "b")
+    with pytest.raises(ConfigError, match="exists and holds something"):
+        join_datasets([varied], varied)
