@@ -9,6 +9,7 @@ from typing import Literal
 from doorstate.simulation.doors import DoorKind, Opening, VariedDoor
 from doorstate.simulation.draws import Draws
 from doorstate.simulation.handles import Handle, draw_handle
+from doorstate.simulation.scene import Hinge, Swing
 from doorstate.types import DoorState
 
 KIND_SHARES: dict[DoorKind, float] = {
@@ -19,6 +20,8 @@ KIND_SHARES: dict[DoorKind, float] = {
     "glazed": 0.1,
     "full_glass": 0.1,
 }
+_HINGES: dict[Hinge, float] = {"left": 0.5, "right": 0.5}
+_SWINGS: dict[Swing, float] = {"towards": 0.5, "away": 0.5}
 # Degrees of the active leaf, and shares of a sliding leaf's way; between the ranges a state is ambiguous.
 ANGLES_DEG = {DoorState.CLOSED: (0.0, 3.0), DoorState.SEMI_OPEN: (15.0, 65.0), DoorState.OPEN: (75.0, 115.0)}
 SLID_SHARES = {DoorState.CLOSED: (0.0, 0.03), DoorState.SEMI_OPEN: (0.20, 0.65), DoorState.OPEN: (0.80, 1.0)}
@@ -32,8 +35,7 @@ def draw_door(draws: Draws) -> VariedDoor:
     """A door in its wall; sizes and shares are those of the data card, all assumed."""
     kind = draws.one_of(KIND_SHARES)
     double = kind in ("double_equal", "double_unequal")
-    hinge = draws.one_of(dict.fromkeys(("left", "right"), 1.0))
-    swing = draws.one_of(dict.fromkeys(("towards", "away"), 1.0))
+    hinge, swing = draws.one_of(_HINGES), draws.one_of(_SWINGS)
     wall = draws.between(0.08, 0.30)
     leaf = draws.between(0.03, 0.04) if kind == "full_glass" else draws.between(0.035, 0.05)
     casing_thickness = draws.between(0.0, 0.025)
@@ -44,8 +46,8 @@ def draw_door(draws: Draws) -> VariedDoor:
     share = {"double_equal": 0.5, "double_unequal": draws.between(0.6, 0.72)}.get(kind, 1.0)
     return VariedDoor(
         kind=kind,
-        hinge=hinge,  # type: ignore[arg-type]
-        swing=swing,  # type: ignore[arg-type]
+        hinge=hinge,
+        swing=swing,
         opening_width_m=draws.between(1.25, 2.0) if double else draws.between(0.62, 1.05),
         opening_height_m=draws.one_of({1.98: 1, 2.03: 1, 2.11: 1, draws.between(1.95, 2.25): 1}),
         wall_thickness_m=wall,

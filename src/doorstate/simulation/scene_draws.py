@@ -24,8 +24,6 @@ _SCENE_TRIES, _CLUTTER_TRIES = 60, 150
 _LEAST_FREE_DEG = 80
 _LEAF_TO_ROBOT_M, _ITEM_TO_ROBOT_M = 0.2, 0.3
 _MOST_ITEMS, _FEW_ITEMS = 8, 4
-# The share of a door that is hidden is much the same in a sixteenth of the pixels.
-_SMALL = DepthCamera(width=160, height=120)
 
 
 class DrawnScene(NamedTuple):
@@ -54,7 +52,7 @@ def draw_cluttered(draws: Draws) -> DrawnScene:
         drawn = draw_varied(draws)
         door, viewpoint = drawn.scene.door, drawn.viewpoint
         assert door is not None
-        view = DoorView(drawn.scene, drawn.openings[0], viewpoint.camera_pose(), _SMALL)
+        view = DoorView(drawn.scene, drawn.openings[0], viewpoint.camera_pose(), DepthCamera())
         leaves = [box for opening in drawn.openings for box in leaf_boxes(door, opening)]
         obstacles = [
             *fixed_boxes(door),
