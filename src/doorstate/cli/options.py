@@ -89,6 +89,14 @@ def read_options(
     return options_from_flags(frame, roll, units, depth_scale, intrinsics, flags)
 
 
+Heads = Annotated[
+    str | None,
+    typer.Option(
+        help="Answers besides the state, separated by commas: door, angle, hinge, frame, widths, parts."
+    ),
+]
+
+
 def recipe_changes(settings: list[str] | None, epochs: int | None) -> dict[str, Any]:
     """Fields of the recipe given as FIELD=VALUE, values as in TOML; a bare word is a string."""
     changes: dict[str, Any] = {} if epochs is None else {"epochs": epochs}
