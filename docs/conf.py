@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from pathlib import Path
 from typing import Any
@@ -50,14 +51,17 @@ nitpick_ignore_regex = [
     ),  # variables, and bare names of NamedTuples
 ]
 
-# Pages that live where people look for them on GitHub.
-_ELSEWHERE = {"../CHANGELOG.md": "changelog.md", "../CONTRIBUTING.md": "contributing.md"}
+REPOSITORY = Path(__file__).resolve().parents[1]
+# Pages that live where people look for them on GitHub; in here a page of the name in front shows them.
+_ELSEWHERE = {"changelog": "CHANGELOG.md", "contributing": "CONTRIBUTING.md", "ros2": "ros2/README.md"}
 
 
 def _read(app: Sphinx, page: str, source: list[str]) -> None:
     text = source[0]
-    for outside, inside in _ELSEWHERE.items():
-        text = text.replace(f"]({outside})", f"]({inside})")
+    if page in _ELSEWHERE:
+        text = _seen_from_here(_ELSEWHERE[page])
+    for inside, outside in _ELSEWHERE.items():
+        text = text.replace(f"](../{outside})", f"]({inside}.md)")
     if page == root_doc:
         text += _contents(text)
     elif page == "commands":
@@ -68,6 +72,19 @@ def _read(app: Sphinx, page: str, source: list[str]) -> None:
         # Tables as `python -m benchmarks` writes them: without headings, reached from the text about them.
         text = "---\norphan: true\n---\n" + re.sub(r"^\*\*(.+)\*\*$", r"# \1", text, flags=re.MULTILINE)
     source[0] = text
+
+
+def _seen_from_here(file: str) -> str:
+    """A page of the repository, its relative links as seen from this folder."""
+    path = REPOSITORY / file
+
+    def moved(link: re.Match[str]) -> str:
+        address, hash_mark, anchor = link[1].partition("#")
+        if "://" in address or not address:
+            return link[0]
+        return f"]({os.path.relpath(path.parent / address, REPOSITORY / 'docs')}{hash_mark}{anchor})"
+
+    return re.sub(r"\]\(([^)\s]+)\)", moved, path.read_text(encoding="utf-8"))
 
 
 def _contents(index: str) -> str:
@@ -94,7 +111,7 @@ def _help_of_commands() -> list[str]:
 
 def _model_cards() -> str:
     """The cards that lie beside the weights in the package, a level deeper."""
-    cards = sorted((Path(__file__).parents[1] / "src/doorstate/deployment/weights").glob("*.md"))
+    cards = sorted((REPOSITORY / "src/doorstate/deployment/weights").glob("*.md"))
     return "".join(
         f"\n(card-{card.stem})=\n" + re.sub("^#", "##", card.read_text(encoding="utf-8"), flags=re.MULTILINE)
         for card in cards
