@@ -62,6 +62,9 @@ FACTORS = (
         "angle between robot and door frame, degrees", _column("robot_angle_deg"), tuple(range(10, 171, 10))
     ),
     Factor("heading beside the door's middle, degrees", _heading_off_deg, tuple(range(-20, 21, 5))),
+    Factor("camera height, m", _column("camera_height_m"), (0.25, 0.4, 0.6, 0.8, 1.0, 1.2)),
+    Factor("camera pitch, degrees", _column("pitch_deg"), (-10, -6, -2, 2, 6, 10)),
+    Factor("occluded share of the door", _column("occluded_share"), (0, 0.001, 0.25, 0.5, 0.75)),
 )
 
 
@@ -73,6 +76,8 @@ def factor_bins(results: ComparisonResults, dataset: PreparedDataset) -> Iterato
         right = predictions.true == predictions.predicted
         for factor in FACTORS:
             place = _places(np.array([factor.value(row) for row in rows]), factor.edges)
+            if len(set(place[place >= 0])) < 2:
+                continue  # the same of every sample
             for index, (low, high) in enumerate(zip(factor.edges, factor.edges[1:], strict=False)):
                 inside = place == index
                 if inside.any():
@@ -85,6 +90,28 @@ def _places(values: Floats, edges: tuple[float, ...]) -> Indices:
     places[values == edges[-1]] = len(edges) - 2
     places[np.isnan(values) | (values > edges[-1])] = -1
     return places
+
+
+KINDS = ("door_kind", "swing", "sensor", "occluded_bin", "ambiguous")
+"""Columns of the manifest that name a kind of sample."""
+
+
+def kinds_table(results: ComparisonResults, dataset: PreparedDataset) -> Table:
+    """Right answers by method and kind of sample, for what differs between samples."""
+    rows = []
+    for method in results.networks:
+        predictions = results.pooled(method)
+        manifest = rows_of(dataset, predictions)
+        for kind in KINDS:
+            values = np.array([row.get(kind, "") for row in manifest])
+            known = sorted(set(values) - {""})
+            for value in known if len(known) > 1 else ():
+                right = predictions.right[values == value]
+                rows.append(
+                    (method, kind, value, str(len(right)), str(right.sum()), number(float(right.mean())))
+                )
+    columns = ("method", "kind", "value", "samples", "right", "accuracy")
+    return Table("Accuracy by kind of sample", columns, tuple(rows), text_columns=3)
 
 
 def factors_table(results: ComparisonResults, dataset: PreparedDataset) -> Table:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -22,7 +23,7 @@ from doorstate.rules.base import Shape
 from doorstate.simulation.manifest import read_csv
 from doorstate.training.comparison import run_of
 from doorstate.training.run_folder import RunFolder, read_json
-from doorstate.types import ANSWERS, STATES, Indices
+from doorstate.types import ANSWERS, NO_DOOR, STATES, Indices
 
 PROBABILITY_COLUMNS = tuple(f"p_{state}" for state in STATES)
 
@@ -69,6 +70,14 @@ class Predictions:
 
 
 @dataclass(frozen=True, eq=False)
+class Answers:
+    """What further heads say of N test samples, in metres and degrees, by the manifest's name of it."""
+
+    sample_ids: tuple[str, ...]
+    columns: Mapping[str, Floats]  # (N,) each; probabilities are `p_door` and `p_hinge_left`
+
+
+@dataclass(frozen=True, eq=False)
 class Run:
     """One network trained and tested on one fold; whatever the run did not write is empty."""
 
@@ -79,6 +88,7 @@ class Run:
     log: Mapping[str, Floats]
     environment: Mapping[str, Any]
     validation: Predictions | None = None
+    answers: Answers | None = None  # of further heads, to all test samples, those without a door too
     found: Found = field(default_factory=dict)  # of a rule, where it was wrong
 
     def metric(self, name: str) -> float:
@@ -141,6 +151,17 @@ class ComparisonResults:
             np.concatenate([part.probabilities for part in parts]),
             np.concatenate([part.angles_deg for part in parts]),
             tuple(reason for part in parts for reason in part.reasons),
+        )
+
+    def answers(self, network: str) -> Answers | None:
+        """Join what further heads of one network say in all folds; None if it has none."""
+        parts = [run.answers for run in self.runs_of(network)]
+        given = [part for part in parts if part is not None]
+        if not given or len(given) < len(parts):
+            return None
+        return Answers(
+            tuple(sample_id for part in given for sample_id in part.sample_ids),
+            {name: np.concatenate([part.columns[name] for part in given]) for name in given[0].columns},
         )
 
     def shapes(self, network: str, sample_id: str) -> tuple[Shape, ...]:
@@ -221,14 +242,21 @@ def _find_dataset(comparison_folder: Path, dataset: str) -> Path:
 
 
 def _read_run(folder: RunFolder, network: str, fold: int) -> Run:
+    predictions = _read_predictions(folder.predictions, fold)
+    answers = _read_answers(folder.answers) if folder.answers.exists() else None
+    if answers is not None and "opening_angle_deg" in answers.columns:
+        said = dict(zip(answers.sample_ids, answers.columns["opening_angle_deg"].tolist(), strict=True))
+        angles_deg = np.array([said.get(sample_id, math.nan) for sample_id in predictions.sample_ids])
+        predictions = replace(predictions, angles_deg=angles_deg)
     return Run(
         network,
         fold,
-        _read_predictions(folder.predictions, fold),
+        predictions,
         read_json(folder.metrics) if folder.metrics.exists() else {},
         _read_log(folder.log) if folder.log.exists() else {},
         read_json(folder.environment) if folder.environment.exists() else {},
         _read_predictions(folder.validation, fold) if folder.validation.exists() else None,
+        answers,
         read_found(folder.found),
     )
 
@@ -256,6 +284,16 @@ def _read_predictions(path: Path, fold: int) -> Predictions:
     return Predictions(
         sample_ids, np.full(len(rows), fold), true, predicted, probabilities, angles_deg, reasons
     )
+
+
+def _read_answers(path: Path) -> Answers:
+    rows = _read_columns(path, ("sample_id",))
+    names = [name for name in (rows[0] if rows else {}) if name != "sample_id"]
+    try:
+        columns = {name: np.array([float(row[name]) for row in rows], dtype=np.float64) for name in names}
+    except ValueError as error:
+        raise RunError(f"{path}: {error}; test this run again") from error
+    return Answers(tuple(row["sample_id"] for row in rows), columns)
 
 
 def _read_log(path: Path) -> dict[str, Floats]:
@@ -288,7 +326,7 @@ def _check_run(
                 f"{path}: sample {sample_id} is {STATES[label]} here and {states.get(sample_id, 'absent')} in"
                 " the data set's manifest.csv; use the data set of this comparison"
             )
-    expected = sum(role == "test" for role in roles.values())
+    expected = sum(role == "test" and states.get(sample_id) != NO_DOOR for sample_id, role in roles.items())
     if len(run.predictions) != expected:
         raise RunError(
             f"{path}: {len(run.predictions)} of {expected} test samples of fold {run.fold}; test it again"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What only rules say: opening angles against the truth, and why there was no answer."""
+"""What rules say besides the state: opening angles against the truth (heads may say them too), and why no answer."""
 
 from __future__ import annotations
 

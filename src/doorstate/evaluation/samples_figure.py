@@ -39,7 +39,16 @@ def samples_figure(dataset: PreparedDataset) -> Figure:
         axes[first, 0].set_ylabel(state, fontsize=11)
         for column, index in enumerate(chosen[s]):
             if index is None:
-                axes[first, column].text(0.5, 0.5, "no such sample", ha="center", va="center", color="gray")
+                empty = axes[first, column]
+                empty.text(
+                    0.5,
+                    0.5,
+                    "no such sample",
+                    transform=empty.transAxes,
+                    ha="center",
+                    va="center",
+                    color="gray",
+                )
                 continue
             picture = pictures[index]
             if picture is not None:

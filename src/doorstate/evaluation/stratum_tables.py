@@ -13,7 +13,7 @@ from doorstate.dataset.strata import BANDS, REGIONS
 from doorstate.evaluation.metrics import accuracy, confusion_matrix, ratio, scores
 from doorstate.evaluation.results import ComparisonResults, Predictions
 from doorstate.evaluation.table import UNDEFINED, Table, number
-from doorstate.types import ANSWERS, STATES, Indices
+from doorstate.types import ANSWERS, NO_DOOR, STATES, Indices
 
 NO_STRATA = "This data set records no distance bands or angle regions."
 NO_TWINS = "This data set does not record which frames look the same in another state."
@@ -71,12 +71,13 @@ def samples_table(dataset: PreparedDataset) -> Table:
     title = "Table 1. Samples by state, angle region and distance to the door"
     if not has_strata(dataset):
         return Table(title, columns, (), NO_STRATA, text_columns=2)
-    labels = [STATES.index(row["state"]) for row in dataset.rows]
-    grid = _with_margins(_stratum_counts(dataset.rows, labels, len(STATES)))
+    states = [*STATES, *([NO_DOOR] if any(row["state"] == NO_DOOR for row in dataset.rows) else [])]
+    labels = [states.index(row["state"]) for row in dataset.rows]
+    grid = _with_margins(_stratum_counts(dataset.rows, labels, len(states)))
     grid = np.concatenate([grid, grid.sum(axis=-1, keepdims=True)], axis=-1)  # (6, 5, 4)
     rows = tuple(
         (state, region, *map(str, line))
-        for state, lines in zip([*STATES, "all"], np.moveaxis(grid, -1, 0), strict=True)
+        for state, lines in zip([*states, "all"], np.moveaxis(grid, -1, 0), strict=True)
         for region, line in zip([*_REGION_TITLES.values(), "all"], lines, strict=True)
     )
     outside = len(dataset.rows) - int(grid[-1, -1, -1])

@@ -9,7 +9,8 @@ from pathlib import Path
 from doorstate.dataset.store import PreparedDataset
 from doorstate.evaluation.calibration import calibration_table
 from doorstate.evaluation.error_kinds import error_kinds_table
-from doorstate.evaluation.factors import factors_table
+from doorstate.evaluation.factors import factors_table, kinds_table
+from doorstate.evaluation.head_tables import answers_table, parts_table, presence_table
 from doorstate.evaluation.metrics import confusion_matrix, scores
 from doorstate.evaluation.results import ComparisonResults
 from doorstate.evaluation.rule_tables import angle_table, reasons_table
@@ -62,6 +63,10 @@ def build_tables(results: ComparisonResults, dataset: PreparedDataset) -> dict[s
                 "angle_errors": angle_table(results, dataset),
                 "reasons": reasons_table(results),
                 "factors": factors_table(results, dataset),
+                "kinds": kinds_table(results, dataset),
+                "head_answers": answers_table(results, dataset),
+                "presence": presence_table(results, dataset),
+                "parts": parts_table(results),
             }
         ),
         "error_kinds": error_kinds_table(results, dataset),

@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What further heads say against the simulator's truth: is there a door, how far open, where, how wide, which part."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from sklearn.metrics import roc_auc_score
+
+from doorstate.dataset.store import PreparedDataset
+from doorstate.evaluation.metrics import Floats, ratio
+from doorstate.evaluation.results import Answers, ComparisonResults
+from doorstate.evaluation.table import Table, number
+from doorstate.types import NO_DOOR, Part
+
+_SURE = 0.5  # from here on a probability is a yes
+
+
+def answers_table(results: ComparisonResults, dataset: PreparedDataset) -> Table:
+    """Errors of every head of every network; of what the manifest does not know of a sample nothing is counted."""
+    rows = []
+    for method in results.networks:
+        given = results.answers(method)
+        if given is not None:
+            rows.append(
+                (method, str(len(given.sample_ids)), *(number(v, d) for v, d in _errors(given, dataset)))
+            )
+    return Table(
+        "Answers of further heads",
+        (
+            "network",
+            "samples",
+            "door, AUROC",
+            "opening angle, semi-open: mean error, °",
+            "open",
+            "hinge side",
+            "frame position: median error, m",
+            "90th percentile",
+            "yaw: median error, °",
+            "opening width: mean error, m",
+            "passable width: mean error, m",
+        ),
+        tuple(rows),
+        "AUROC: how well the probability of a door puts samples with a door above those without. Hinge: share right.",
+    )
+
+
+def presence_table(results: ComparisonResults, dataset: PreparedDataset) -> Table:
+    """How often a network says that there is a door, by what is there."""
+    rows = []
+    for method in results.networks:
+        given = results.answers(method)
+        if given is None or "p_door" not in given.columns:
+            continue
+        manifest = [dataset.rows[dataset.index_of(sample_id)] for sample_id in given.sample_ids]
+        kinds = np.array([row.get("door_kind") or row.get("scene_kind", "") for row in manifest])
+        doors = np.array([row["state"] != NO_DOOR for row in manifest])
+        said = given.columns["p_door"] >= _SURE
+        for is_door, name in ((True, "yes"), (False, "no")):
+            for kind in sorted(set(kinds[doors == is_door])):
+                chosen = (doors == is_door) & (kinds == kind)
+                count, yes = int(chosen.sum()), int(said[chosen].sum())
+                rows.append((method, name, kind or "unknown", str(count), str(yes), number(yes / count)))
+    return Table(
+        "Is there a door?",
+        ("network", "a door", "kind", "samples", "said yes", "share"),
+        tuple(rows),
+        text_columns=3,
+    )
+
+
+def parts_table(results: ComparisonResults) -> Table:
+    """Intersection over union of each part of the scene, points of all folds together."""
+    parts = [part for part in Part if part != Part.NONE]
+    rows = []
+    for method in results.networks:
+        counts = [run.metrics.get("test_part_counts") for run in results.runs_of(method)]
+        if not all(counts):
+            continue
+        joined = np.array(counts).sum(axis=0)  # (parts, parts)
+        right = np.diagonal(joined)
+        union = joined.sum(axis=0) + joined.sum(axis=1) - right
+        shares = ratio(right, union)
+        mean = float(np.nanmean(shares))
+        rows.append((method, *(number(float(share), 3) for share in shares), number(mean, 3)))
+    columns = ("network", *(part.name.lower() for part in parts), "mean")
+    return Table("Parts of points: intersection over union", columns, tuple(rows))
+
+
+def _errors(given: Answers, dataset: PreparedDataset) -> list[tuple[float, int]]:
+    """Figures of a row of `answers_table`, each with its digits."""
+    manifest = [dataset.rows[dataset.index_of(sample_id)] for sample_id in given.sample_ids]
+
+    def truth(*names: str) -> Floats:
+        return np.array([float(next((row[n] for n in names if row.get(n)), math.nan)) for row in manifest])
+
+    def off(name: str, *others: str) -> Floats:
+        return np.abs(given.columns.get(name, math.nan) - truth(name, *others))
+
+    state = np.array([row["state"] for row in manifest])
+    angle = off("opening_angle_deg")
+    hinge = np.array([row.get("hinge") or row.get("door.hinge", "") for row in manifest])
+    said_left = given.columns.get("p_hinge_left", np.full(len(state), math.nan))
+    hinge_right = (said_left >= _SURE) == (hinge == "left")
+    place = np.hypot(off("door_x_m"), off("door_y_m"))
+    turn = np.abs((given.columns.get("door_yaw_deg", math.nan) - truth("door_yaw_deg") + 180) % 360 - 180)
+    return [
+        (_auroc(given, state), 4),
+        (_mean(angle[state == "semi_open"]), 1),
+        (_mean(angle[state == "open"]), 1),
+        (_mean(hinge_right[(hinge != "") & ~np.isnan(said_left)].astype(float)), 4),
+        (_quantile(place, 0.5), 3),
+        (_quantile(place, 0.9), 3),
+        (_quantile(turn, 0.5), 1),
+        (_mean(off("opening_width_m", "door.opening_width_m")), 3),
+        (_mean(off("passable_width_m")), 3),
+    ]
+
+
+def _auroc(given: Answers, state: np.ndarray) -> float:
+    doors = state != NO_DOOR
+    if "p_door" not in given.columns or doors.all() or not doors.any():
+        return math.nan
+    return float(roc_auc_score(doors, given.columns["p_door"]))
+
+
+def _mean(values: Floats) -> float:
+    return _quantile(values, None)
+
+
+def _quantile(values: Floats, share: float | None) -> float:
+    """A quantile of what is known, or its mean."""
+    known = values[~np.isnan(values)]
+    if len(known) == 0:
+        return math.nan
+    return float(known.mean() if share is None else np.quantile(known, share))
