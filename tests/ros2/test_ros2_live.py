@@ -145,18 +145,19 @@ def clouds() -> list[Points]:
 
 
 @pytest.fixture(scope="module")
-def processes() -> Iterator[dict[str, subprocess.Popen[str]]]:
+def processes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, subprocess.Popen[str]]]:
     """The node with a network, one with a rule and depth images, and one that was told nonsense."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
         patch.setenv("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))  # nobody else's nodes
+        patch.setenv("ROS_LOG_DIR", str(tmp_path_factory.mktemp("log")))
         patch.setenv("OMP_NUM_THREADS", "1")
         first = ["points:=256", "hold_s:=0.3", "silence_s:=0.8", "max_hz:=0.0"]
         second = ["input:=depth", "rule:=wall_leaf_angle", "reliable:=true", "max_hz:=0.0"]
         started = {
             "first": start(
                 "--params-file", str(PACKAGE / "config" / "doorstate.yaml"),
-                *(word for each in first for word in ("-p", each)), "-r", f"points:={TOPIC}",
+                *(word for each in first for word in ("-p", each)), "-r", f"cloud:={TOPIC}",
             ),
             "second": start(*(word for each in second for word in ("-p", each)), "-r", "__ns:=/second"),
             "wrong": start("-p", "ponits:=512"),

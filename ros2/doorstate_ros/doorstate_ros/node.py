@@ -26,7 +26,7 @@ from doorstate.deployment.watch_settings import WatchSettings, parse_settings
 from doorstate.errors import DoorstateError
 
 ROS_PARAMETERS = {"use_sim_time", "start_type_description_service"}  # that every node has
-INPUTS = {"points": PointCloud2, "depth": Image, "compressed_depth": CompressedImage}
+INPUTS = {"cloud": PointCloud2, "depth": Image, "compressed_depth": CompressedImage}
 LATCHED = QoSProfile(
     depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
 )
@@ -66,7 +66,7 @@ class DoorNode:
         policy = ReliabilityPolicy.RELIABLE if settings.reliable else ReliabilityPolicy.BEST_EFFORT
         # The newest message only: what comes while the one before is being answered takes the place of what waits.
         newest = QoSProfile(depth=1, reliability=policy)
-        if settings.input != "points":
+        if settings.input != "cloud":
             node.create_subscription(CameraInfo, "camera_info", self._watch.see_camera, newest)
         message_type = INPUTS[settings.input]
         seen = node.create_subscription(message_type, settings.input, self._on_message, newest)

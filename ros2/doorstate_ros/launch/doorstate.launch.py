@@ -9,7 +9,7 @@ from launch_ros.substitutions import FindPackageShare
 
 # The node's topics, by the names of a RealSense.
 TOPICS = {
-    "points": "/camera/camera/depth/color/points",
+    "cloud": "/camera/camera/depth/color/points",
     "depth": "/camera/camera/depth/image_rect_raw",
     "compressed_depth": "/camera/camera/depth/image_rect_raw/compressedDepth",
     "camera_info": "/camera/camera/depth/camera_info",

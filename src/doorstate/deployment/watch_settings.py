@@ -15,7 +15,7 @@ from doorstate.deployment.rule_predictor import RulePredictor
 from doorstate.errors import ConfigError
 from doorstate.training.environment import keep_freed_memory
 
-MESSAGE_TYPES = {"points": CLOUD, "depth": IMAGE, "compressed_depth": COMPRESSED_IMAGE}  # by input
+MESSAGE_TYPES = {"cloud": CLOUD, "depth": IMAGE, "compressed_depth": COMPRESSED_IMAGE}  # by input
 
 
 class WatchSettings(BaseModel):
@@ -23,8 +23,8 @@ class WatchSettings(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
-    input: Literal["points", "depth", "compressed_depth"] = Field(
-        "points", description="What is read: PointCloud2, Image or CompressedImage."
+    input: Literal["cloud", "depth", "compressed_depth"] = Field(
+        "cloud", description="What is read: PointCloud2, Image or CompressedImage."
     )
     network: str = Field(DEFAULT_NETWORK, description="Network whose packaged weights answer.")
     weights: str = Field(
