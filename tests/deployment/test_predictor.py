@@ -16,8 +16,11 @@ from doorstate.dataset.store import PreparedDataset
 from doorstate.deployment.predictor import Predictor, packaged_networks, packaged_weights
 from doorstate.errors import CloudContentError, ConfigError, WeightsError
 from doorstate.networks import create_network
+from doorstate.networks.base import PointNetwork
+from doorstate.networks.heads import HEADS, answers, give_heads
 from doorstate.simulation.generate import replay
 from doorstate.simulation.manifest import unflatten
+from doorstate.training.answers import in_metres
 from doorstate.training.weights import WeightsCard, save_weights
 from doorstate.types import STATES
 
@@ -150,7 +153,10 @@ def test_equal_clouds_go_through_the_network_at_once(
     predictor: Predictor, small_dataset: PreparedDataset
 ) -> None:
     sizes: list[int] = []
-    handle = predictor.network.register_forward_hook(lambda _, inputs, __: sizes.append(len(inputs[0])))
+    assert isinstance(predictor.network, PointNetwork)
+    handle = predictor.network.get_submodule("level1").register_forward_hook(
+        lambda _, inputs, __: sizes.append(len(inputs[0]))
+    )
     predictor.batch([replay(unflatten(row)).points for row in small_dataset.rows[:3]])
     handle.remove()
     assert sizes == [3]
@@ -175,3 +181,71 @@ def test_packaged_weights_answer_new_doors(name: str, small_dataset: PreparedDat
     )
     # Another seed than they were trained on; a weights file that was mixed up would get a third.
     assert right >= 16
+
+
+@pytest.fixture(scope="module")
+def headed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Untrained weights with every head."""
+    torch.manual_seed(0)
+    network, heads = create_network("pointnet2"), (*HEADS, "parts")
+    give_heads(network, heads)
+    path = tmp_path_factory.mktemp("headed") / "pointnet2.safetensors"
+    save_weights(path, network, WeightsCard(network="pointnet2", num_points=160, heads=heads))
+    return path
+
+
+def test_heads_answer_in_metres_beside_the_state(headed: Path, small_dataset: PreparedDataset) -> None:
+    predictor = Predictor.load(headed)
+    cloud = replay(unflatten(small_dataset.rows[5])).points
+    answer = predictor(cloud)
+    assert isinstance(predictor.network, PointNetwork)
+    prepared = prepare_cloud(cloud, 160, thin=True).points[None]
+    with torch.no_grad():
+        said = answers(predictor.network, torch.from_numpy(normalize(prepared)))
+    columns = in_metres(
+        {name: said[name].numpy() for name in HEADS},
+        prepared.mean(axis=1, dtype=np.float64).astype(np.float32),
+    )
+    assert answer.door_probability == pytest.approx(columns["p_door"][0])
+    assert answer.opening_angle_deg == pytest.approx(columns["opening_angle_deg"][0])
+    assert answer.hinge == ("left" if columns["p_hinge_left"][0] >= 0.5 else "right")
+    assert answer.frame is not None
+    assert answer.frame.x_m == pytest.approx(columns["door_x_m"][0], abs=1e-5)
+    assert answer.frame.yaw_deg == pytest.approx(columns["door_yaw_deg"][0])
+    assert answer.passable_width_m == pytest.approx(columns["passable_width_m"][0])
+    # The mean point of a cloud is within two metres of its door.
+    assert 0 < answer.frame.x_m < 6
+
+
+def test_several_clouds_have_the_answers_of_each(headed: Path, small_dataset: PreparedDataset) -> None:
+    predictor = Predictor.load(headed)
+    clouds = [small_dataset.cloud(index) for index in (0, 7)] + [small_dataset.cloud(3)[:140]]
+    for alone, together in zip(map(predictor, clouds), predictor.batch(clouds), strict=True):
+        assert alone.state == together.state
+        assert alone.points == together.points
+        assert together.frame == pytest.approx(alone.frame, abs=1e-4)
+
+
+def test_no_door_is_no_state_with_the_reason(headed: Path, small_dataset: PreparedDataset) -> None:
+    predictor = Predictor.load(headed)
+    door = predictor.network.heads["door"]  # type: ignore[union-attr]
+    cloud = small_dataset.cloud(2)
+    for bias, sees in ((-9.0, False), (9.0, True)):
+        torch.nn.init.constant_(door.linear.bias, bias)  # type: ignore[union-attr, arg-type]
+        answer = predictor(cloud)
+        assert (answer.state is not None) == sees == (answer.reason == "")
+        assert sees or "there seems to be no door: the probability of one is 0.0" in answer.reason
+
+
+def test_an_unsure_answer_is_none_where_the_weights_say_so(small_dataset: PreparedDataset) -> None:
+    network = create_network("pointnet2")
+    cloud = small_dataset.cloud(2)
+    answer = Predictor(network, WeightsCard(network="pointnet2", num_points=160), 160)(cloud)
+    assert answer.state is not None
+    best = max(answer.probabilities.values())
+    for least, answers_it in ((best - 0.01, True), (best + 0.01, False)):
+        card = WeightsCard(network="pointnet2", num_points=160, abstain_below=least)
+        asked = Predictor(network, card, 160)(cloud)
+        assert (asked.state == answer.state) == answers_it
+        assert answers_it or asked.reason.startswith(f"unsure: {answer.state.label} has {best:.2f}")
+        assert asked.probabilities == answer.probabilities

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from doorstate.errors import CloudContentError, MissingExtraError, WeightsError
+from doorstate.training.answers import Columns
 from doorstate.training.card import WeightsCard
 from doorstate.types import STATES, Points
 
@@ -78,6 +79,10 @@ class OnnxNetwork:
             )
         answer: NDArray[np.float32] = self._session.run([OUTPUT], {INPUT: points})[0]
         return answer
+
+    def ask(self, points: Points) -> tuple[NDArray[np.float32], Columns]:
+        """As `probabilities`; further heads are not in the file."""
+        return self.probabilities(points), {}
 
 
 def _threads_by_environment() -> int:

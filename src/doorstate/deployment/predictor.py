@@ -5,16 +5,16 @@ from __future__ import annotations
 
 import statistics
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from doorstate.clouds.preparation import NUM_POINTS, PreparedCloud, prepare_cloud
+from doorstate.clouds.preparation import NUM_POINTS, prepare_cloud
 from doorstate.deployment.gate import Gate
 from doorstate.deployment.onnx_network import OnnxNetwork
 from doorstate.errors import ConfigError, MissingExtraError, WeightsError
@@ -28,7 +28,19 @@ if TYPE_CHECKING:
 DEFAULT_NETWORK = "pointnet2"
 DEFAULT_GATE = Gate()
 BUDGET_POINTS = (256, 512, 1024, 2048, 4096)  # what a time budget is spent on
+_SURE = 0.5  # from here on a probability is a yes
 _BUDGET_REPEATS = 5  # of each, after one that warms up
+
+
+class DoorFrame(NamedTuple):
+    """Where a door is in the sensor frame: the middle of its opening, and where the wall leads on its left.
+
+    A wall straight ahead has a yaw of 90 degrees.
+    """
+
+    x_m: float
+    y_m: float
+    yaw_deg: float
 
 
 @dataclass(frozen=True)
@@ -40,7 +52,12 @@ class Prediction:
     points: int  # how many points were looked at
     milliseconds: float  # from raw points to this answer
     reason: str = ""  # why there is no answer
-    opening_angle_deg: float | None = None  # where the method tells it
+    opening_angle_deg: float | None = None  # where the method tells it, as all that follows
+    door_probability: float | None = None  # that there is a door at all
+    hinge: Literal["left", "right"] | None = None  # as seen from the camera
+    frame: DoorFrame | None = None
+    opening_width_m: float | None = None
+    passable_width_m: float | None = None  # between leaf and jamb
     found: tuple[Shape, ...] = field(default=(), compare=False, repr=False)  # by a rule, on the way
 
     @classmethod
@@ -82,11 +99,11 @@ class Predictor:
                 raise ConfigError(
                     f"{points} points asked for, but the .onnx file takes {network.card.num_points}: export it again"
                 )
-            self._classify = network.probabilities
+            self._ask = network.ask
         else:
             from doorstate.deployment.torch_network import TorchNetwork
 
-            self._classify = TorchNetwork(network, card.temperature).probabilities
+            self._ask = TorchNetwork(network, card.temperature).ask
         self.network = network
         self.card = card
         self.points = points
@@ -147,7 +164,7 @@ class Predictor:
         return chosen
 
     def __call__(self, points: Points) -> Prediction:
-        """State of the door in a cloud, or none with the gate's reason.
+        """State of the door in a cloud, or none with the reason: the gate's, no door, or too little certainty.
 
         Args:
             points: (N, 3) or organized (H, W, 3) metres, x forward, y left, z up, NaN where nothing was measured.
@@ -173,30 +190,69 @@ class Predictor:
         prepared = [prepare_cloud(cloud, self.points, thin=self.thin) for cloud in clouds]
         reasons = [None if self.gate is None else self.gate(cloud) for cloud in clouds]
         asked = [number for number, reason in enumerate(reasons) if reason is None]
-        probabilities = np.zeros((len(clouds), len(STATES)), dtype=np.float32)
+        said: dict[int, _Said] = {}
         for count in sorted({len(prepared[number].points) for number in asked}):
             alike = [number for number in asked if len(prepared[number].points) == count]
-            probabilities[alike] = self._probabilities([prepared[number] for number in alike])
+            probabilities, columns = self._ask(np.stack([prepared[number].points for number in alike]))
+            for place, number in enumerate(alike):
+                told = {name: float(values[place]) for name, values in columns.items()}
+                said[number] = _Said(probabilities[place], told)
         milliseconds = (self.clock() - started) * 1000 / max(1, len(clouds))
         return [
-            Prediction(
-                DoorState(int(each.argmax())) if reason is None else None,
-                {state: float(p) for state, p in zip(STATES, each, strict=True)},
-                len(cloud.points),
-                milliseconds,
-                reason or "",
-            )
-            for cloud, each, reason in zip(prepared, probabilities, reasons, strict=True)
+            self._prediction(said.get(number), len(cloud.points), milliseconds, reasons[number])
+            for number, cloud in enumerate(prepared)
         ]
 
-    def _probabilities(self, prepared: list[PreparedCloud]) -> NDArray[np.float32]:
-        """(B, 3) of clouds with equally many points."""
-        return self._classify(np.stack([cloud.points for cloud in prepared]))
+    def _prediction(
+        self, said: _Said | None, points: int, milliseconds: float, refused: str | None
+    ) -> Prediction:
+        if said is None:
+            return replace(Prediction.none(refused or ""), points=points, milliseconds=milliseconds)
+        best, told = int(said.probabilities.argmax()), said.told
+        sure, p_door = float(said.probabilities[best]), told.get("p_door")
+        reason = ""
+        if p_door is not None and p_door < _SURE:
+            reason = f"there seems to be no door: the probability of one is {p_door:.2f}"
+        elif sure < self.card.abstain_below:
+            label, least = DoorState(best).label, self.card.abstain_below
+            reason = f"unsure: {label} has {sure:.2f}, these weights answer from {least:.2f} on"
+        return Prediction(
+            None if reason else DoorState(best),
+            {state: float(p) for state, p in zip(STATES, said.probabilities, strict=True)},
+            points,
+            milliseconds,
+            reason,
+            told.get("opening_angle_deg"),
+            p_door,
+            _hinge(told),
+            _frame(told),
+            told.get("opening_width_m"),
+            told.get("passable_width_m"),
+        )
 
     def warm_up(self) -> None:
         """Run once on noise, so that the first real cloud is as quick as the others."""
         cloud = np.random.default_rng(0).normal(2.0, 1.0, (self.points, 3)).astype(np.float32)
-        self._probabilities([prepare_cloud(cloud, self.points)])
+        self._ask(prepare_cloud(cloud, self.points).points[None])
+
+
+class _Said(NamedTuple):
+    """What a network says of one cloud."""
+
+    probabilities: NDArray[np.float32]  # (3,)
+    told: Mapping[str, float]  # by further heads (training.answers)
+
+
+def _hinge(told: Mapping[str, float]) -> Literal["left", "right"] | None:
+    if "p_hinge_left" not in told:
+        return None
+    return "left" if told["p_hinge_left"] >= _SURE else "right"
+
+
+def _frame(told: Mapping[str, float]) -> DoorFrame | None:
+    if "door_x_m" not in told:
+        return None
+    return DoorFrame(told["door_x_m"], told["door_y_m"], told["door_yaw_deg"])
 
 
 def _load(name_or_path: str | Path) -> tuple[PointNetwork | OnnxNetwork, WeightsCard]:

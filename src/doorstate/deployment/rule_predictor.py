@@ -63,7 +63,8 @@ class RulePredictor:
             (time.perf_counter() - started) * 1000,
             answer.reason,
             answer.opening_angle_deg,
-            answer.found,
+            opening_width_m=answer.opening_width_m,
+            found=answer.found,
         )
 
     def warm_up(self) -> None:

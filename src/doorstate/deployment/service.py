@@ -85,7 +85,18 @@ class Answer(BaseModel):
     points: int = Field(description="How many points were looked at.")
     milliseconds: float = Field(description="From raw points to this answer; reading the file is not in it.")
     reason: str = Field("", description="Why there is no state.")
-    opening_angle_deg: float | None = Field(None, description="Where the method tells it.")
+    opening_angle_deg: float | None = Field(
+        None, description="Where the method tells it, as all that follows."
+    )
+    door_probability: float | None = Field(None, description="That there is a door at all.")
+    hinge: str | None = Field(None, description="left or right, as seen from the camera.")
+    door_x_m: float | None = Field(None, description="Middle of the opening, ahead of the camera.")
+    door_y_m: float | None = Field(None, description="The same, to the left.")
+    door_yaw_deg: float | None = Field(
+        None, description="Where the wall leads on its left; 90 is straight ahead."
+    )
+    opening_width_m: float | None = Field(None, description="Of the frame.")
+    passable_width_m: float | None = Field(None, description="Between leaf and jamb.")
 
 
 class Health(BaseModel):

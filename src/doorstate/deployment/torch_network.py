@@ -7,8 +7,10 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from doorstate.clouds.preparation import normalize
+from doorstate.clouds.preparation import centroids, normalize
 from doorstate.networks.base import PointNetwork
+from doorstate.networks.heads import PARTS, STATE, answers
+from doorstate.training.answers import Columns, in_metres
 from doorstate.types import Points
 
 
@@ -26,7 +28,12 @@ class TorchNetwork:
 
     def probabilities(self, points: Points) -> NDArray[np.float32]:
         """(B, 3) probabilities of (B, n, 3) metres in farthest-point order."""
+        return self.ask(points)[0]
+
+    def ask(self, points: Points) -> tuple[NDArray[np.float32], Columns]:
+        """As `probabilities`, and what further heads say, (B,) each."""
         with torch.inference_mode():
-            logits = self.network(torch.from_numpy(normalize(points)))
-            calibrated: NDArray[np.float32] = (logits / self.temperature).softmax(1).numpy()
-        return calibrated
+            said = answers(self.network, torch.from_numpy(normalize(points)))
+            calibrated: NDArray[np.float32] = (said.pop(STATE) / self.temperature).softmax(1).numpy()
+        said.pop(PARTS, None)
+        return calibrated, in_metres({name: each.numpy() for name, each in said.items()}, centroids(points))

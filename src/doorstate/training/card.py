@@ -22,5 +22,6 @@ class WeightsCard(BaseModel):
     scale_m: float = SCALE_M
     states: tuple[str, ...] = STATES
     temperature: float = Field(default=1.0, gt=0)  # logits are divided by it (training.calibration)
+    abstain_below: float = Field(default=0.0, ge=0, lt=1)  # no state from a probability below this
     trained_on: str = ""
     doorstate_version: str = __version__
