@@ -18,6 +18,7 @@ from doorstate.deployment.torch_network import TorchNetwork
 from doorstate.errors import ExportError
 from doorstate.networks import create_network, list_networks
 from doorstate.networks.base import PointNetwork
+from doorstate.networks.heads import HEADS, give_heads
 from doorstate.networks.layers import set_batchnorm
 from doorstate.training.card import WeightsCard
 
@@ -78,6 +79,24 @@ def test_the_file_answers_as_torch_does(name: str, clouds: LabelledClouds, tmp_p
     assert exported.card == card_of(name).model_copy(update={"num_points": 160})
 
 
+def test_heads_are_outputs_of_the_file(clouds: LabelledClouds, tmp_path: Path) -> None:
+    network, heads = used_to("pointnet2", clouds), (*HEADS, "parts")
+    give_heads(network, heads)
+    card = card_of("pointnet2").model_copy(update={"heads": heads})
+    comparison = export_onnx(tmp_path / "network.onnx", network.eval(), card, clouds)
+    assert comparison.largest <= TOLERANCE
+    exported = OnnxNetwork(tmp_path / "network.onnx")
+    _, expected = TorchNetwork(network, 0.1).ask(clouds.points)
+    probabilities, columns = exported.ask(clouds.points)
+    assert list(columns) == list(expected)
+    for name, values in expected.items():
+        assert np.ptp(values) > 0 or name.endswith("width_m")  # widths are cut at 0
+        np.testing.assert_allclose(columns[name], values, atol=0.01 if name.endswith("_deg") else 1e-4)
+    assert np.array_equal(probabilities, exported.probabilities(clouds.points))
+    outputs = [each.name for each in onnx.load(tmp_path / "network.onnx").graph.output]
+    assert outputs == ["probabilities", *HEADS]
+
+
 def test_int8_is_a_quarter_of_the_size_and_another_answer(clouds: LabelledClouds, tmp_path: Path) -> None:
     network = used_to("pointnet", clouds)
     comparison = export_onnx(tmp_path / "small.onnx", network, card_of("pointnet"), clouds, int8=True)
@@ -94,7 +113,7 @@ def test_a_file_that_would_answer_otherwise_is_not_written(
     monkeypatch.setattr(onnx_export, "SCALE_M", 2.0)
     with pytest.raises(
         ExportError,
-        match=r"net\.onnx not written: its probabilities differ from torch's by \S+, more than 0\.0001",
+        match=r"net\.onnx not written: its answers differ from torch's by \S+, more than 0\.0001",
     ):
         export_onnx(tmp_path / "net.onnx", used_to("pointnet", clouds), card_of("pointnet"), clouds)
     assert list(tmp_path.iterdir()) == []

@@ -18,14 +18,16 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from doorstate import __version__
-from doorstate.clouds.preparation import SCALE_M, normalize, prepare_cloud
-from doorstate.deployment.onnx_network import CARD, INPUT, OUTPUT, OnnxNetwork
+from doorstate.clouds.preparation import SCALE_M, prepare_cloud
+from doorstate.deployment.onnx_network import CARD, INPUT, OUTPUT, OnnxNetwork, heads_told
 from doorstate.deployment.torch_network import TorchNetwork
 from doorstate.errors import ConfigError, ExportError, MissingExtraError
 from doorstate.files import atomic_path
 from doorstate.jobs import Progress, no_progress
 from doorstate.networks.base import PointNetwork
+from doorstate.networks.heads import PARTS, STATE, answers
 from doorstate.simulation.generate import PRESETS, draw_pose, pose_indices, replay
+from doorstate.training.answers import Columns
 from doorstate.training.card import WeightsCard
 from doorstate.types import STATES, Points
 
@@ -46,6 +48,11 @@ _METADATA = {
         f"centring and division by {SCALE_M} m are in the graph"
     ),
     "labels": ",".join(STATES),
+    "heads": (
+        "door: probability of one; angle: radians; hinge: probability of left; frame: x, y of the opening's middle, "
+        f"divided by {SCALE_M} after the mean of the points is taken away, and the yaw in radians of the wall's "
+        f"normal towards the camera; widths: of the opening and of the free way, divided by {SCALE_M}"
+    ),
 }
 
 
@@ -53,7 +60,7 @@ _METADATA = {
 class Comparison:
     """How far the file is from torch on the same clouds."""
 
-    largest: float  # difference in a probability
+    largest: float  # difference in a probability, or in what another head says
     allowed: float
     clouds: int
     right: int  # states that the file tells as they are
@@ -75,11 +82,12 @@ class _Graph(nn.Module):
         self.network = network
         self.temperature = card.temperature
 
-    def forward(self, points: Tensor) -> Tensor:
+    def forward(self, points: Tensor) -> tuple[Tensor, ...]:
         # As clouds.preparation.normalize, to the last digit: what is just inside a ball must not be just outside.
         centroid = points.mean(1, keepdim=True, dtype=torch.float64).to(torch.float32)
-        logits: Tensor = self.network((points - centroid) / SCALE_M)
-        return (logits / self.temperature).softmax(1)
+        said = answers(self.network, (points - centroid) / SCALE_M)
+        said.pop(PARTS, None)
+        return ((said.pop(STATE) / self.temperature).softmax(1), *said.values())
 
 
 def export_onnx(
@@ -137,7 +145,7 @@ def export_onnx(
         comparison = compare_with_torch(temporary, network, card, clouds, progress)
         if not int8 and comparison.largest > comparison.allowed:
             raise ExportError(
-                f"{path.name} not written: its probabilities differ from torch's by {comparison.largest:.1g}, "
+                f"{path.name} not written: its answers differ from torch's by {comparison.largest:.1g}, "
                 f"more than {comparison.allowed:.1g}"
             )
     return comparison
@@ -165,36 +173,42 @@ def compare_with_torch(
     """
     points, labels = clouds
     exported, original = OnnxNetwork(path), TorchNetwork(network, card.temperature)
-    answers: list[NDArray[np.float32]] = []
+    told: list[NDArray[np.float32]] = []
     expected: list[NDArray[np.float32]] = []
     progress(0, len(points))
     for alone in range(0, len(points), 3):
         for some in (points[alone : alone + 1], points[alone + 1 : alone + 3]):
             if len(some):
-                answers.append(exported.probabilities(some))
-                expected.append(original.probabilities(some))
+                told.append(_in_columns(exported.ask(some)))
+                expected.append(_in_columns(original.ask(some)))
         progress(min(alone + 3, len(points)), len(points))
-    found, said = np.concatenate(answers), np.concatenate(expected)
+    found, said = np.concatenate(told), np.concatenate(expected)
     largest, allowed = float(np.abs(found - said).max()), TOLERANCE
     if largest > TOLERANCE:
         allowed = max(TOLERANCE, 2 * rounding_in_torch(network, card, points))
-    right, right_in_torch = (int((each.argmax(1) == labels).sum()) for each in (found, said))
+    states = len(STATES)
+    right, right_in_torch = (int((each[:, :states].argmax(1) == labels).sum()) for each in (found, said))
     return Comparison(largest, allowed, len(points), right, right_in_torch)
 
 
+def _in_columns(said: tuple[NDArray[np.float32], Columns]) -> NDArray[np.float32]:
+    """(B, 3 + heads) probabilities, and what heads say, angles in radians so that their digits weigh the same."""
+    probabilities, columns = said
+    heads = [np.radians(each) if name.endswith("_deg") else each for name, each in columns.items()]
+    return np.column_stack([probabilities, *heads]).astype(np.float32)
+
+
 def rounding_in_torch(network: PointNetwork, card: WeightsCard, points: Points) -> float:
-    """How far a probability moves when the last digits change: those of the points, or all by float64."""
+    """How far an answer moves when the last digits change: those of the points, or all by float64."""
     original, rng = TorchNetwork(network, card.temperature), np.random.default_rng(0)
-    exact = copy.deepcopy(network).double().eval()
+    exact = TorchNetwork(copy.deepcopy(network).double(), card.temperature)
     furthest = 0.0
     for cloud in points:
-        said = original.probabilities(cloud[None])
-        with torch.inference_mode():
-            logits = exact(torch.from_numpy(normalize(cloud))[None].double())
-            others = [(logits / card.temperature).softmax(1).numpy()]
+        said = _in_columns(original.ask(cloud[None]))
+        others = [_in_columns(exact.ask(cloud[None], np.float64))]
         for _ in range(_JITTERS):
             jitter = np.float32(1) + rng.choice(_LAST_DIGIT, cloud.shape)
-            others.append(original.probabilities((cloud * jitter)[None]))
+            others.append(_in_columns(original.ask((cloud * jitter)[None])))
         furthest = max(furthest, *(float(np.abs(said - other).max()) for other in others))
     return furthest
 
@@ -233,7 +247,7 @@ def _model(network: PointNetwork, card: WeightsCard, num_points: int, opset: int
         opset_version=opset,
         dynamic_shapes=({0: torch.export.Dim("batch")},),
         input_names=[INPUT],
-        output_names=[OUTPUT],
+        output_names=[OUTPUT, *heads_told(card)],
         verbose=False,
     )
     assert program is not None  # since `dynamo`

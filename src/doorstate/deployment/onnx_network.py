@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
+from doorstate.clouds.preparation import centroids
 from doorstate.errors import CloudContentError, MissingExtraError, WeightsError
-from doorstate.training.answers import Columns
+from doorstate.training.answers import Columns, in_metres
 from doorstate.training.card import WeightsCard
 from doorstate.types import STATES, Points
 
@@ -65,9 +66,14 @@ class OnnxNetwork:
             ) from error
         if self.card.states != STATES:
             raise WeightsError(f"{path}: made for states {self.card.states}")
+        self._heads = heads_told(self.card)
 
     def probabilities(self, points: Points) -> NDArray[np.float32]:
-        """(B, 3) probabilities of (B, n, 3) metres in farthest-point order.
+        """(B, 3) probabilities of (B, n, 3) metres in farthest-point order; errors as of `ask`."""
+        return self.ask(points)[0]
+
+    def ask(self, points: Points) -> tuple[NDArray[np.float32], Columns]:
+        """As `probabilities`, and what further heads say, (B,) each.
 
         Raises:
             CloudContentError: n is not the number of points that the file takes.
@@ -77,12 +83,13 @@ class OnnxNetwork:
                 f"too few points: {points.shape[1]} distinct, but the .onnx file takes {self.card.num_points}: "
                 "export it again with fewer --points"
             )
-        answer: NDArray[np.float32] = self._session.run([OUTPUT], {INPUT: points})[0]
-        return answer
+        answer, *heads = self._session.run([OUTPUT, *self._heads], {INPUT: points})
+        return answer, in_metres(dict(zip(self._heads, heads, strict=True)), centroids(points))
 
-    def ask(self, points: Points) -> tuple[NDArray[np.float32], Columns]:
-        """As `probabilities`; further heads are not in the file."""
-        return self.probabilities(points), {}
+
+def heads_told(card: WeightsCard) -> tuple[str, ...]:
+    """Outputs of a file besides the probabilities: heads of whole clouds."""
+    return tuple(name for name in card.heads if name != "parts")
 
 
 def _threads_by_environment() -> int:

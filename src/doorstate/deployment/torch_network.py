@@ -30,10 +30,12 @@ class TorchNetwork:
         """(B, 3) probabilities of (B, n, 3) metres in farthest-point order."""
         return self.ask(points)[0]
 
-    def ask(self, points: Points) -> tuple[NDArray[np.float32], Columns]:
-        """As `probabilities`, and what further heads say, (B,) each."""
+    def ask(
+        self, points: Points, kind: type[np.floating] = np.float32
+    ) -> tuple[NDArray[np.float32], Columns]:
+        """As `probabilities`, and what further heads say, (B,) each; in the number type of the network's weights."""
         with torch.inference_mode():
-            said = answers(self.network, torch.from_numpy(normalize(points)))
+            said = answers(self.network, torch.from_numpy(normalize(points).astype(kind)))
             calibrated: NDArray[np.float32] = (said.pop(STATE) / self.temperature).softmax(1).numpy()
         said.pop(PARTS, None)
         return calibrated, in_metres({name: each.numpy() for name, each in said.items()}, centroids(points))
