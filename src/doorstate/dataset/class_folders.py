@@ -6,13 +6,15 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
+from typing import TypeVar
 
 from doorstate.clouds.io import find_clouds
 from doorstate.dataset.strata import distance_band, polar, region
 from doorstate.errors import DatasetError
 from doorstate.simulation.manifest import read_csv
-from doorstate.types import DoorState
+from doorstate.types import NO_DOOR, DoorState
 
 # Order matters: "semi-open" and "half closed" hold the other words too.
 _SPELLINGS = (
@@ -23,6 +25,8 @@ _SPELLINGS = (
 _WORDS = re.compile(
     r"(semi|half|yari|ajar|partly|partially|partial|opened|open|closed|close|shut|doors?|is|the|aralik|kapali|acik)+"
 )
+_NO_DOOR = re.compile(r"none|(no|without)(an?y?)?(clear)?doors?")
+Meaning = TypeVar("Meaning")
 
 
 def state_of_folder(name: str) -> DoorState | None:
@@ -33,19 +37,26 @@ def state_of_folder(name: str) -> DoorState | None:
     return next((state for state, spelling in _SPELLINGS if spelling.search(letters)), None)
 
 
-def state_of_path(root: Path, path: Path) -> DoorState | None:
-    """The state that the nearest folder of a file spells, up to `root` itself."""
+def label_of_folder(name: str) -> str | None:
+    """As `state_of_folder`, and `no_door` of a name such as `none`, `no door` or `without_doors`."""
+    state = state_of_folder(name)
+    if state is not None:
+        return state.label
+    return NO_DOOR if _NO_DOOR.fullmatch(re.sub(r"[^a-z]", "", name.lower())) else None
+
+
+def nearest(root: Path, path: Path, means: Callable[[str], Meaning | None]) -> Meaning | None:
+    """What the nearest folder of a file means that means anything, up to `root` itself."""
     names = (root.name, *path.relative_to(root).parts[:-1])
-    states = (state_of_folder(name) for name in reversed(names))
-    return next((state for state in states if state is not None), None)
+    return next((found for name in reversed(names) if (found := means(name)) is not None), None)
 
 
-def row_of(root: Path, path: Path, state: DoorState) -> dict[str, str]:
+def row_of(root: Path, path: Path, label: str) -> dict[str, str]:
     """Manifest row of a file below `root`."""
     relative = path.relative_to(root)
     return {
         "sample_id": relative.with_suffix("").as_posix(),
-        "state": state.label,
+        "state": label,
         "file": relative.as_posix(),
     }
 
@@ -69,10 +80,10 @@ def labelled_rows(root: Path, poses_csv: Path | None = None) -> list[dict[str, s
     poses = _read_poses(poses_csv) if poses_csv else {}
     rows, unused = [], set(poses)
     for path in find_clouds([root]):
-        state = state_of_path(root, path)
+        state = nearest(root, path, state_of_folder)
         if state is None:
             continue
-        row = row_of(root, path, state)
+        row = row_of(root, path, state.label)
         relative = path.relative_to(root)
         key = next((k for k in (relative.as_posix(), relative.name) if k in poses), None)
         if key:

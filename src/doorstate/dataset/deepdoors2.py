@@ -27,7 +27,7 @@ from doorstate.clouds.camera import Intrinsics, Pinhole
 from doorstate.clouds.depth import depth_to_points
 from doorstate.clouds.io import ReadOptions, find_clouds
 from doorstate.clouds.png import parse_coarse_png
-from doorstate.dataset.class_folders import row_of, state_of_path
+from doorstate.dataset.class_folders import nearest, row_of, state_of_folder
 from doorstate.errors import CloudReadError, DatasetError, DoorstateError
 from doorstate.types import Points
 
@@ -57,11 +57,11 @@ def deepdoors2_rows(root: Path) -> list[dict[str, str]]:
     for path in find_clouds([root]):
         folders = [name.lower() for name in path.absolute().parent.parts]
         kind = next((name for name in reversed(folders) if name in ("depth", "rgb")), None)
-        state = state_of_path(root, path)
+        state = nearest(root, path, state_of_folder)
         if kind != "depth" or "cropped" in folders or "(" in path.name or state is None:
             continue
         split = next((name for name in reversed(folders) if name in _SPLITS), "")
-        rows.append(row_of(root, path, state) | {"split": split})
+        rows.append(row_of(root, path, state.label) | {"split": split})
     if not rows:
         raise DatasetError(
             f"{root}: no depth images in folders such as Depth/Test/Closed, as DeepDoors2 has them"

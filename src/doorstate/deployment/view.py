@@ -24,7 +24,7 @@ from doorstate.types import STATES, Points
 Entry = dict[str, Any]
 """One cloud as the page takes it; it holds an `error`, or an `answer` and a `cloud`."""
 
-_CHANNEL_PARTS = 32  # channels are counted in, so that two bytes hold 0 to 2047
+CHANNEL_PARTS = 32  # channels are counted in, so that two bytes hold 0 to 2047
 
 
 def look(predictor: Predictor | RulePredictor, sighting: Sighting) -> Entry:
@@ -48,7 +48,7 @@ def look(predictor: Predictor | RulePredictor, sighting: Sighting) -> Entry:
     channels = None if answer.state is None else _channels(predictor, prepared.points)
     parts = None if sighting.parts is None else sighting.parts[prepared.indices[:NUM_POINTS]]
     if channels is not None:
-        counted = np.rint(channels[:NUM_POINTS] * _CHANNEL_PARTS).astype("<u2")
+        counted = np.rint(channels[:NUM_POINTS] * CHANNEL_PARTS).astype("<u2")
         entry["channels"] = encode_bytes(counted.tobytes())
     return entry | {
         "answer": described(answer),
@@ -88,6 +88,6 @@ def render_view(predictor: Predictor | RulePredictor, entries: Sequence[Entry], 
             "live": live,
             "states": STATES,
             "state_colors": STATE_COLORS,
-            "channel_parts": _CHANNEL_PARTS,
+            "channel_parts": CHANNEL_PARTS,
         },
     )

@@ -90,7 +90,7 @@ def _card(dataset: PreparedDataset, row: Mapping[str, str], answers: tuple[Error
         row["state"],
         is_undecidable(row),
         tuple(_facts(row)),
-        None if picture is None else _picture_uri(picture),
+        None if picture is None else picture_uri(picture),
         answers,
     )
 
@@ -117,7 +117,8 @@ def _facts(row: Mapping[str, str]) -> list[str]:
     return facts
 
 
-def _picture_uri(picture: NDArray[np.uint8]) -> str:
+def picture_uri(picture: NDArray[np.uint8]) -> str:
+    """A small JPEG of (H, W, 3) pixels as an address."""
     image = Image.fromarray(picture)
     image.thumbnail(_PICTURE_PX)
     encoded = io.BytesIO()

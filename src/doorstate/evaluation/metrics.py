@@ -7,13 +7,14 @@ and one more for no answer, which only a prediction can be.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import binomtest
+from scipy.stats import binomtest, norm
 from sklearn import metrics as sklearn_metrics
 
 from doorstate.types import ANSWERS, STATES, Indices
@@ -93,6 +94,26 @@ def wilson_interval(successes: int, trials: int) -> Interval:
         return float("nan"), float("nan")
     interval = binomtest(int(successes), int(trials)).proportion_ci(CONFIDENCE, method="wilson")
     return float(interval.low), float(interval.high)
+
+
+def grouped_interval(right: NDArray[np.bool_], groups: Sequence[str]) -> Interval:
+    """Give the 95 % Wilson interval of a share when samples of one group say no more than one of them would.
+
+    Trials are Kish's effective number, (sum m)^2 / sum m^2 of the groups' sizes m: his design effect at an
+    intraclass correlation of 1 (Kish 1965). Independent samples have `wilson_interval`; the truth lies between.
+
+    Args:
+        right: (N,) what is counted.
+        groups: N names.
+    """
+    if len(right) == 0:
+        return float("nan"), float("nan")
+    _, sizes = np.unique(np.asarray(groups), return_counts=True)
+    trials, share = sizes.sum() ** 2 / (sizes**2).sum(), float(right.mean())
+    z = float(norm.ppf((1 + CONFIDENCE) / 2))
+    middle, scale = share + z * z / (2 * trials), 1 + z * z / trials
+    half = z * math.sqrt(share * (1 - share) / trials + (z / (2 * trials)) ** 2)
+    return max(0.0, (middle - half) / scale), min(1.0, (middle + half) / scale)
 
 
 @dataclass(frozen=True)

@@ -2,8 +2,6 @@
   const { data } = clouds;
   const entries = [];
   const MOST = 300; // of a stream; older ones are forgotten
-  const MUTED = "rgba(128,128,128,.45)";
-  const HEAT = [[0, "#9aa3ae"], [0.3, "#f2b632"], [0.65, "#ee6a1f"], [1, "#d3114f"]];
   const colors = ["part", "height", "channels"];
   const dark = matchMedia("(prefers-color-scheme: dark)");
   const element = (id) => document.getElementById(id);
@@ -27,28 +25,10 @@
   const can = (entry, color) =>
     color === "height" || Boolean(color === "part" ? entry.cloud.parts : entry.channels);
 
-  function channelsOf(entry) {
-    const raw = new DataView(clouds.bytes(entry.channels).buffer);
-    return Float32Array.from({ length: raw.byteLength / 2 }, (_, i) => raw.getUint16(2 * i, true) / data.channel_parts);
-  }
-
-  function byChannels(cloud, channels) {
-    const everyone = clouds.everyPoint(cloud);
-    const [seen, passed] = [everyone.filter((i) => channels[i] > 0), everyone.filter((i) => !(channels[i] > 0))];
-    const values = seen.map((i) => channels[i]);
-    const high = [...values].sort((a, b) => a - b)[Math.floor(0.98 * values.length)] || 1;
-    const looked = clouds.points(cloud, seen, "looked at", {
-      size: values.map((value) => 2.5 + 4 * Math.sqrt(Math.min(1, value / high))), line: { width: 0 },
-      color: values, colorscale: HEAT, cmin: 0, cmax: high, showscale: true,
-      colorbar: { title: { text: "channels", side: "top" }, thickness: 10, len: 0.6, outlinewidth: 0 },
-    }, "<br>%{marker.color:.1f} channels");
-    return [clouds.points(cloud, passed, "passed over", { size: 1.5, color: MUTED }), looked];
-  }
-
   function traces(entry, color) {
     const cloud = clouds.decode(entry.cloud);
     const points = color === "part" ? clouds.byPart(cloud)
-      : color === "channels" ? byChannels(cloud, channelsOf(entry)) : clouds.byHeight(cloud);
+      : color === "channels" ? clouds.byChannels(cloud, clouds.channelsOf(entry)) : clouds.byHeight(cloud);
     return [...points, clouds.camera(), ...entry.shapes.map((shape) => clouds.shape(shape, shape.name))];
   }
 

@@ -4,6 +4,8 @@ const clouds = (() => {
   const data = JSON.parse(document.getElementById("page-data").textContent);
   const part = Object.fromEntries(data.parts.map((p) => [p.value, p]));
   const bytes = (text) => Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
+  const MUTED = "rgba(128,128,128,.45)";
+  const HEAT = [[0, "#9aa3ae"], [0.3, "#f2b632"], [0.65, "#ee6a1f"], [1, "#d3114f"]];
   const pick = (values, members) => members.map((i) => values[i]);
   const shapeColor = (name) => data.shape_colors[name] || data.shape_colors.edge;
 
@@ -29,6 +31,29 @@ const clouds = (() => {
     const members = everyPoint(cloud).filter((i) => cloud.parts[i] === value);
     return points(cloud, members, part[value].name, { size: 2, color: part[value].color });
   });
+
+  function channelsOf(entry) {
+    const raw = new DataView(bytes(entry.channels).buffer);
+    return Float32Array.from({ length: raw.byteLength / 2 }, (_, i) => raw.getUint16(2 * i, true) / data.channel_parts);
+  }
+
+  function mostChannels(channels) {
+    const seen = Array.from(channels).filter((value) => value > 0).sort((a, b) => a - b);
+    return seen[Math.floor(0.98 * seen.length)] || 1;
+  }
+
+  function byChannels(cloud, channels) {
+    const everyone = everyPoint(cloud);
+    const [seen, passed] = [everyone.filter((i) => channels[i] > 0), everyone.filter((i) => !(channels[i] > 0))];
+    const values = seen.map((i) => channels[i]);
+    const high = mostChannels(channels);
+    const looked = points(cloud, seen, "looked at", {
+      size: values.map((value) => 2.5 + 4 * Math.sqrt(Math.min(1, value / high))), line: { width: 0 },
+      color: values, colorscale: HEAT, cmin: 0, cmax: high, showscale: true,
+      colorbar: { title: { text: "channels", side: "top" }, thickness: 10, len: 0.6, outlinewidth: 0 },
+    }, "<br>%{marker.color:.1f} channels");
+    return [points(cloud, passed, "passed over", { size: 1.5, color: MUTED }), looked];
+  }
 
   const camera = () => ({
     type: "scatter3d", mode: "markers", name: "camera", hovertemplate: "camera",
@@ -58,6 +83,68 @@ const clouds = (() => {
     };
   }
 
+  const partColors = (cloud) => Array.from(cloud.parts, (value) => part[value].color);
+
+  function channelColors(channels) {
+    const high = mostChannels(channels);
+    const rgb = (hex) => [1, 3, 5].map((k) => Number.parseInt(hex.slice(k, k + 2), 16));
+    return Array.from(channels, (value) => {
+      if (!(value > 0)) return MUTED;
+      const share = Math.min(1, value / high);
+      const k = Math.max(1, HEAT.findIndex(([stop]) => share <= stop));
+      const [[from, low], [to, top]] = [HEAT[k - 1], HEAT[k]];
+      const [a, b] = [rgb(low), rgb(top)];
+      return `rgb(${a.map((v, i) => Math.round(v + ((b[i] - v) * (share - from)) / (to - from)))})`;
+    });
+  }
+
+  function heightColors({ z }) {
+    let low = Infinity, high = -Infinity;
+    for (const value of z) { low = Math.min(low, value); high = Math.max(high, value); }
+    return Array.from(z, (value) => `hsl(${260 - (200 * (value - low)) / (high - low || 1)} 70% 42%)`);
+  }
+
+  // The same oblique view as Figure 2: from behind and above the camera, near points last.
+  function preview(canvas, cloud, colors, shapes) {
+    const { azimuth: a, elevation: e } = data.view;
+    const forward = [Math.cos(e) * Math.cos(a), Math.cos(e) * Math.sin(a), -Math.sin(e)];
+    const right = [Math.sin(a), -Math.cos(a), 0];
+    const up = [Math.sin(e) * Math.cos(a), Math.sin(e) * Math.sin(a), Math.cos(e)];
+    const along = (d) => Float32Array.from(cloud.x, (x, i) => x * d[0] + cloud.y[i] * d[1] + cloud.z[i] * d[2]);
+    const [u, v, depth] = [along(right), along(up), along(forward)];
+    const scale = window.devicePixelRatio || 1;
+    const [width, height] = [canvas.clientWidth * scale, canvas.clientHeight * scale];
+    [canvas.width, canvas.height] = [width, height];
+    // Flying pixels far off must not make the rest small.
+    const span = (values) => {
+      const sorted = values.slice().sort();
+      const [low, high] = [0.01, 0.99].map((share) => sorted[Math.round(share * (sorted.length - 1))]);
+      const margin = 0.08 * (high - low);
+      return [Math.max(sorted[0], low - margin), Math.min(sorted[sorted.length - 1], high + margin)];
+    };
+    const [[left, rightmost], [bottom, top]] = [span(u), span(v)];
+    const zoom = 0.92 * Math.min(width / (rightmost - left || 1), height / (top - bottom || 1));
+    const pen = canvas.getContext("2d");
+    const size = Math.max(1.5 * scale, width / 260);
+    for (const i of Array.from(depth.keys()).sort((p, q) => depth[q] - depth[p])) {
+      pen.fillStyle = colors[i];
+      pen.fillRect(
+        width / 2 + zoom * (u[i] - (left + rightmost) / 2), height / 2 - zoom * (v[i] - (bottom + top) / 2), size, size,
+      );
+    }
+    const dot = (p, d) => p[0] * d[0] + p[1] * d[1] + p[2] * d[2];
+    const place = (p) => [
+      width / 2 + zoom * (dot(p, right) - (left + rightmost) / 2), height / 2 - zoom * (dot(p, up) - (bottom + top) / 2),
+    ];
+    pen.lineWidth = 1.5 * scale;
+    for (const { name, points } of shapes) {
+      pen.strokeStyle = pen.fillStyle = shapeColor(name);
+      pen.beginPath();
+      if (points.length === 1) pen.arc(...place(points[0]), 2.5 * scale, 0, 2 * Math.PI), pen.fill();
+      else points.forEach((p, k) => (k ? pen.lineTo(...place(p)) : pen.moveTo(...place(p)))), pen.stroke();
+    }
+  }
+
   function plotly() {
     if (!window.Plotly) {
       const script = document.createElement("script");
@@ -68,7 +155,8 @@ const clouds = (() => {
   }
 
   return {
-    data, part, bytes, decode, points, everyPoint, byHeight, byPart, camera, shape, shapeColor, layout, plotly,
+    data, part, bytes, decode, points, everyPoint, byHeight, byPart, channelsOf, byChannels, partColors, heightColors,
+    channelColors, preview, camera, shape, shapeColor, layout, plotly,
     config: { displaylogo: false, responsive: true },
   };
 })();
