@@ -59,6 +59,7 @@ class Asked:
                 "method": method,
                 "predicted": _said(said).answer,
                 **{f"p_{state}": f"{said.probabilities[state]:.5g}" for state in STATES},
+                "p_door": "" if said.door_probability is None else f"{said.door_probability:.5g}",
                 "found_angle_deg": "" if said.opening_angle_deg is None else f"{said.opening_angle_deg:.1f}",
                 "reason": said.reason,
                 **frame.columns,
