@@ -10,11 +10,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, SerializerFunctionWrapHandler, model_serializer
 
 from doorstate.clouds.camera import Intrinsics
 from doorstate.simulation.scene import Box, Material
@@ -32,7 +33,8 @@ _EDGES = np.array(
 class DepthCamera(BaseModel):
     """A pinhole depth camera; the defaults are the ASUS Xtion Pro as Gazebo's `openni_kinect` plugin simulates it.
 
-    Image 640x480, 60 degrees, valid strictly between 0.4 and 5.0 m (SIMULATION section 1.2).
+    Image 640x480, 60 degrees, valid strictly between 0.4 and 5.0 m (SIMULATION section 1.2). Pixels are square; the
+    centre of projection is the image's, unless it is given.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -42,10 +44,22 @@ class DepthCamera(BaseModel):
     hfov_deg: float = 60.0
     min_depth_m: float = 0.4
     max_depth_m: float = 5.0
+    cx_px: float | None = None
+    cy_px: float | None = None
 
     def intrinsics(self) -> Intrinsics:
         """The pinhole of Gazebo: f = W / (2 tan(hfov / 2)), centre ((W - 1) / 2, (H - 1) / 2)."""
-        return Intrinsics.from_hfov(self.width, self.height, math.radians(self.hfov_deg))
+        ideal = Intrinsics.from_hfov(self.width, self.height, math.radians(self.hfov_deg))
+        return replace(
+            ideal,
+            cx=ideal.cx if self.cx_px is None else self.cx_px,
+            cy=ideal.cy if self.cy_px is None else self.cy_px,
+        )
+
+    @model_serializer(mode="wrap")
+    def _without_what_is_not_given(self, fields: SerializerFunctionWrapHandler) -> dict[str, float]:
+        # Manifests have no columns for what ordinary cameras do not have.
+        return {name: value for name, value in fields(self).items() if value is not None}
 
 
 CAMERAS = {

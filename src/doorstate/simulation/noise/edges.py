@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Depth edges: pixels that see two surfaces at once give nothing, or a depth between the two."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field
+
+from doorstate.types import DepthImage
+
+
+class Edges(BaseModel):
+    """Shares of SIMULATION section 3.2."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    jump: float = Field(default=0.05, gt=0)  # of the nearer depth, to one of the four pixels around
+    lost: float = Field(default=0.5, ge=0, le=1)
+    flying: float = Field(default=0.1, ge=0, le=1)  # of those not lost
+
+
+def blur_edges(depth_m: DepthImage, edges: Edges, rng: np.random.Generator) -> DepthImage:
+    """NaN, or anywhere between both depths, in pixels beside a jump.
+
+    A pixel that was lost is no other surface, and one that sees nothing (inf) is no depth to fly to.
+    """
+    other = _across(depth_m, edges.jump).ravel()
+    beside = np.flatnonzero(~np.isnan(other))
+    lost, flies, share = rng.random((3, len(beside)), dtype=np.float32)
+    mixed = depth_m.copy()
+    flat = mixed.ravel()
+    own, far = flat[beside], other[beside]
+    flying = (flies < np.float32(edges.flying)) & np.isfinite(own) & np.isfinite(far)
+    own[flying] += share[flying] * (far[flying] - own[flying])
+    own[(lost < np.float32(edges.lost)) & np.isfinite(own)] = np.nan
+    flat[beside] = own
+    return mixed
+
+
+def _across(depth_m: DepthImage, jump: float) -> NDArray[np.float32]:
+    """Depth on the other side of a jump, NaN where there is none."""
+    other = np.full(depth_m.shape, np.nan, np.float32)
+    for one, two, mine, its in (
+        (depth_m[:, :-1], depth_m[:, 1:], other[:, :-1], other[:, 1:]),
+        (depth_m[:-1], depth_m[1:], other[:-1], other[1:]),
+    ):
+        apart = np.minimum(one, two)
+        apart *= np.float32(1 + jump)
+        jumps = np.maximum(one, two) > apart
+        np.copyto(mine, two, where=jumps)
+        np.copyto(its, one, where=jumps)
+    return other

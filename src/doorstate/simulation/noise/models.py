@@ -1,0 +1,260 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Sensors by name: a camera and the stages that its measurements go through, in the order of SIMULATION section 3.2."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict
+
+from doorstate.clouds.camera import Intrinsics
+from doorstate.errors import ConfigError
+from doorstate.simulation.noise.axial import Axial, ConstantAxial, NguyenAxial, StereoAxial, add_noise
+from doorstate.simulation.noise.dropout import Grazing, Speckle, lose_grazing, lose_speckle
+from doorstate.simulation.noise.edges import Edges, blur_edges
+from doorstate.simulation.noise.lateral import Lateral, draw_moves
+from doorstate.simulation.noise.materials import Materials, lose_patches, loss_shares
+from doorstate.simulation.noise.quantisation import (
+    DepthSteps,
+    DisparitySteps,
+    round_depth,
+    round_disparity,
+)
+from doorstate.simulation.noise.shadow import SecondView, hide_from_second_view
+from doorstate.simulation.noise.streams import stage_rng
+from doorstate.simulation.scene import Box
+from doorstate.simulation.sensor import CAMERAS, CameraPose, DepthCamera, Render, cut_range, incidence
+from doorstate.types import DepthImage
+
+Number = TypeVar("Number", bound=np.generic)
+_ANGLE_STEPS = np.float32(2**14)  # in a radian
+
+
+class SensorModel(BaseModel):
+    """A camera and its stages, which come in the order of the fields; a stage that is None is left out."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    name: str
+    camera: DepthCamera = CAMERAS["xtion-gazebo"]
+    materials: Materials | None = None
+    second_view: SecondView | None = None
+    lateral: Lateral | None = None
+    axial: Axial | None = None
+    disparity_steps: DisparitySteps | None = None
+    grazing: Grazing | None = None
+    edges: Edges | None = None
+    speckle: Speckle | None = None
+    depth_steps: DepthSteps | None = None
+
+    def added_sigma_m(
+        self, depth_m: DepthImage, incidence_rad: NDArray[np.float32], focal_px: float
+    ) -> NDArray[np.float32]:
+        """Standard deviation of the axial noise before rounding; (H, W)."""
+        assert self.axial is not None
+        sigma: NDArray[np.float32] = self.axial.sigma_m(depth_m, incidence_rad, focal_px)
+        if self.axial.kind == "nguyen" and self.disparity_steps is not None:
+            # Published for rounded depth: what rounding adds, step^2 / 12, must not be added twice.
+            step = self.disparity_steps.step_m(depth_m, focal_px)
+            step *= step
+            sigma *= sigma
+            sigma -= step / np.float32(12)
+            sigma = np.sqrt(np.maximum(sigma, np.float32(0), out=sigma), out=sigma)
+        return sigma
+
+
+def gaussian(deviation_m: float) -> SensorModel:
+    """Normal noise of one standard deviation, and nothing else."""
+    return SensorModel(name=f"gaussian:{deviation_m:g}", axial=ConstantAxial(deviation_m=deviation_m))
+
+
+def _structured_light(name: str, camera: DepthCamera) -> SensorModel:
+    # Chips of PrimeSense: baseline 75 mm, projector to the right as the camera looks, disparity in 1/8 px.
+    return SensorModel(
+        name=name,
+        camera=camera,
+        materials=Materials(),
+        second_view=SecondView(baseline_m=0.075),
+        lateral=Lateral(),
+        axial=NguyenAxial(),
+        disparity_steps=DisparitySteps(baseline_m=0.075, step_px=1 / 8),
+        grazing=Grazing(),
+        edges=Edges(),
+        speckle=Speckle(share=0.002, side_px=3),
+    )
+
+
+_D435 = SensorModel(
+    name="d435",
+    # f = 424 px; nearest f b / 126; 10 m is chosen.
+    camera=DepthCamera(width=848, height=480, hfov_deg=90.0, min_depth_m=0.168, max_depth_m=10.0),
+    materials=Materials(),
+    second_view=SecondView(baseline_m=0.050, is_imager=True),
+    axial=StereoAxial(baseline_m=0.050, disparity_px=0.08),
+    disparity_steps=DisparitySteps(baseline_m=0.050, step_px=1 / 32),
+    edges=Edges(),
+    speckle=Speckle(share=0.01, side_px=9),
+)
+# 640 x 480, f = 384.681, centre (319.226, 242.138), put upright by a clockwise quarter turn (dataset/deepdoors2.py): a
+# column becomes a row, and row v becomes column 479 - v. The second imager is then below.
+_DEEPDOORS2 = _D435.model_copy(
+    update={
+        "name": "deepdoors2",
+        "camera": DepthCamera(
+            width=480,
+            height=640,
+            hfov_deg=2 * math.degrees(math.atan(240 / 384.681)),
+            min_depth_m=0.168,
+            max_depth_m=10.0,
+            cx_px=479 - 242.138,
+            cy_px=319.226,
+        ),
+        "second_view": SecondView(baseline_m=0.050, is_imager=True, towards="down"),
+        "depth_steps": DepthSteps(step_m=1 / 16, bits=8),
+    }
+)
+_DEFAULT_GAUSSIAN_M = 0.01
+SENSORS = {
+    model.name: model
+    for model in (
+        SensorModel(name="none"),
+        gaussian(_DEFAULT_GAUSSIAN_M).model_copy(update={"name": "gaussian"}),
+        _structured_light("xtion", CAMERAS["xtion-hw"]),
+        # Kinect v1: 57 degrees, 0.8-4.0 m.
+        _structured_light("kinect", DepthCamera(hfov_deg=57.0, min_depth_m=0.8, max_depth_m=4.0)),
+        _D435,
+        _DEEPDOORS2,
+    )
+}
+
+
+def find_sensor(name: str) -> SensorModel:
+    """A model by name; `gaussian:0.02` has a standard deviation of 0.02 m.
+
+    Raises:
+        ConfigError: no such sensor.
+    """
+    kind, _, deviation = name.partition(":")
+    if kind == "gaussian" and deviation:
+        try:
+            value = float(deviation)
+        except ValueError:
+            value = math.nan
+        if not 0 <= value < math.inf:
+            raise ConfigError(f"sensor {name!r}: after the colon comes a standard deviation in metres")
+        return gaussian(value)
+    if name not in SENSORS:
+        raise ConfigError(f"no sensor {name!r}: choose one of {', '.join(SENSORS)}, or gaussian:METRES")
+    return SENSORS[name]
+
+
+def apply(
+    model: SensorModel,
+    seen: Render,
+    boxes: Sequence[Box],
+    pose: CameraPose,
+    camera: DepthCamera,
+    seed: int,
+) -> Render:
+    """What the sensor measures, cut to the camera's range.
+
+    Args:
+        model: the sensor.
+        seen: what `render_behind_glass` saw of the boxes from the pose with this camera.
+        boxes: the scene, glass and all.
+        pose: of the camera.
+        camera: the model's own, or another whose noise is to be like the model's.
+        seed: the sample's own (`streams.sample_seed`).
+
+    Returns:
+        Depth NaN, part NONE and box NO_BOX where nothing is measured; at ragged edges labels move with measurements.
+    """
+    return cut_range(distort(model, seen, boxes, pose, camera.intrinsics(), seed), camera)
+
+
+def distort(
+    model: SensorModel,
+    seen: Render,
+    boxes: Sequence[Box],
+    pose: CameraPose,
+    intrinsics: Intrinsics,
+    seed: int,
+) -> Render:
+    """As `apply`, before the range is cut: inf where the ray hits nothing, NaN where the measurement is lost.
+
+    A lost pixel stays lost in every later stage.
+    """
+    angle_rad = _incidence(model, seen, boxes, pose, intrinsics)
+    seen = _hide(model, seen, angle_rad, boxes, pose, intrinsics, seed)
+    if model.lateral is not None:
+        moves = draw_moves(seen, angle_rad, model.lateral, stage_rng(seed, "lateral"))
+        seen = Render(_moved(seen.depth_m, *moves), _moved(seen.part, *moves), _moved(seen.box, *moves))
+        angle_rad = _moved(angle_rad, *moves)
+    depth_m = seen.depth_m
+    if model.axial is not None:
+        depth_m = _with_axial_noise(model, depth_m, angle_rad, intrinsics.fx, seed)
+    if model.disparity_steps is not None:
+        depth_m = round_disparity(depth_m, model.disparity_steps, intrinsics.fx)
+    if model.grazing is not None:
+        depth_m = lose_grazing(depth_m, angle_rad, model.grazing, stage_rng(seed, "grazing"))
+    if model.edges is not None:
+        depth_m = blur_edges(depth_m, model.edges, stage_rng(seed, "edges"))
+    if model.speckle is not None:
+        depth_m = lose_speckle(depth_m, model.speckle, stage_rng(seed, "speckle"))
+    if model.depth_steps is not None:
+        depth_m = round_depth(depth_m, model.depth_steps)
+    return seen._replace(depth_m=depth_m)
+
+
+def _incidence(
+    model: SensorModel, seen: Render, boxes: Sequence[Box], pose: CameraPose, intrinsics: Intrinsics
+) -> NDArray[np.float32]:
+    """Angle of incidence; zeros where no stage asks for it, since it costs as much as a rendering."""
+    glossy = model.materials is not None and any(box.material == "gloss" for box in boxes)
+    steep = model.lateral is not None or model.grazing is not None
+    if not (glossy or steep or (model.axial is not None and model.axial.kind == "nguyen")):
+        return np.zeros(seen.box.shape, np.float32)
+    # Processors differ in the last digits of an arc cosine; on a grid of 2^-14 rad they agree.
+    rounded: NDArray[np.float32] = (
+        np.rint(incidence(seen, boxes, pose, intrinsics) * _ANGLE_STEPS) / _ANGLE_STEPS
+    )
+    return rounded
+
+
+def _hide(
+    model: SensorModel,
+    seen: Render,
+    angle_rad: NDArray[np.float32],
+    boxes: Sequence[Box],
+    pose: CameraPose,
+    intrinsics: Intrinsics,
+    seed: int,
+) -> Render:
+    depth_m = seen.depth_m
+    if model.materials is not None:
+        shares = loss_shares(model.materials, seen, angle_rad, boxes, pose, intrinsics)
+        if shares is not None:
+            rng = stage_rng(seed, "materials")
+            depth_m = lose_patches(depth_m, shares, model.materials.patch_px, rng)
+    if model.second_view is not None:
+        depth_m = hide_from_second_view(depth_m, model.second_view, intrinsics.fx)
+    return seen._replace(depth_m=depth_m)
+
+
+def _with_axial_noise(
+    model: SensorModel, depth_m: DepthImage, angle_rad: NDArray[np.float32], focal_px: float, seed: int
+) -> DepthImage:
+    finite = np.isfinite(depth_m)
+    measured = np.where(finite, depth_m, np.float32(1))
+    noisy = add_noise(measured, model.added_sigma_m(measured, angle_rad, focal_px), stage_rng(seed, "axial"))
+    return np.where(finite, noisy, depth_m)
+
+
+def _moved(image: NDArray[Number], targets: NDArray[np.int64], sources: NDArray[np.int64]) -> NDArray[Number]:
+    changed = image.copy()
+    changed.ravel()[targets] = image.ravel()[sources]
+    return changed
