@@ -42,6 +42,10 @@ def simulate(
         int | None, typer.Option(help="How many scenes of the other presets; 1000 if not given.", min=1)
     ] = None,
     seed: Annotated[int, typer.Option(help="Everything random is drawn from it.", min=0)] = 0,
+    sensor: Annotated[
+        str,
+        typer.Option(help="none, gaussian, gaussian:METRES, xtion, kinect, d435 or deepdoors2."),
+    ] = "none",
     keep: Annotated[
         list[str] | None, typer.Option(help="Raw files to keep: pcd, depth, image; repeatable.")
     ] = None,
@@ -55,6 +59,7 @@ def simulate(
       doorstate simulate --out data/ogurob
       doorstate simulate --out data/small --poses 60 --keep pcd --keep image
       doorstate simulate --preset varied --scenes 10000 --out data/varied
+      doorstate simulate --preset varied --scenes 10000 --sensor xtion --out data/varied-xtion
       doorstate simulate --preset cluttered --scenes 40000 --shard 2/8 --out data/cluttered
     """
     from doorstate.console import err, print_table, progress_bar
@@ -69,7 +74,7 @@ def simulate(
     if unknown:
         raise ConfigError(f"--keep {unknown[0]}: choose from {', '.join(RAW_KINDS)}")
     kinds: Any = tuple(kind for kind in RAW_KINDS if kind in (keep or []))
-    settings = settings_for(preset, seed, poses, scenes, kinds)
+    settings = settings_for(preset, seed, poses, scenes, kinds, sensor)
     if shard is not None:
         share = Shard.parse(shard)
         with progress_bar("Simulating") as progress:

@@ -4,22 +4,38 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BaseModel
 
 from doorstate.clouds.camera import Intrinsics
 from doorstate.clouds.depth import depth_to_points
+from doorstate.simulation.noise.models import apply, find_sensor
+from doorstate.simulation.noise.streams import sample_seed
 from doorstate.simulation.scene import Box
-from doorstate.simulation.sensor import CameraPose, DepthCamera, Render, cut_range, render_behind_glass
+from doorstate.simulation.sensor import CameraPose, DepthCamera, Render, render_behind_glass
 from doorstate.types import DepthImage, Points
 
 SAME_IMAGE_M = 1e-4
+AnyRow = TypeVar("AnyRow", bound=BaseModel)
 
 
 class Sample(Protocol):
     """A row that can be replayed."""
+
+    @property
+    def sample_id(self) -> str:
+        """Its name."""
+
+    @property
+    def seed(self) -> int:
+        """What everything random in it depends on."""
+
+    @property
+    def sensor(self) -> str:
+        """What measures: a name for `noise.models.find_sensor`."""
 
     @property
     def camera(self) -> DepthCamera:
@@ -35,7 +51,7 @@ class Sample(Protocol):
 class Frame(NamedTuple):
     """A replayed sample."""
 
-    full: Render  # before the range cut: what a colour camera would see
+    full: Render  # before sensor and range: what a colour camera would see
     cut: Render  # what the depth camera reports
     points: Points  # (H, W, 3) metres, gravity-aligned sensor frame
 
@@ -43,10 +59,21 @@ class Frame(NamedTuple):
 def replay(row: Sample) -> Frame:
     """Rebuild the frame of a manifest row, bit for bit."""
     pose, intrinsics = row.camera_pose(), row.camera.intrinsics()
-    full = render_behind_glass(row.boxes(), pose, intrinsics)
-    cut = cut_range(full, row.camera)
+    boxes, sensor = row.boxes(), find_sensor(row.sensor)
+    full = render_behind_glass(boxes, pose, intrinsics)
+    cut = apply(sensor, full, boxes, pose, row.camera, sample_seed(row.seed, row.sample_id))
     points = depth_to_points(cut.depth_m, intrinsics)
     return Frame(full, cut, level(points, pose.pitch_rad, pose.roll_rad))
+
+
+def sensed_by(row: AnyRow, sensor: str) -> AnyRow:
+    """The row as this sensor sees it, with the sensor's own camera if that is not the usual one.
+
+    Raises:
+        ConfigError: no such sensor.
+    """
+    camera = find_sensor(sensor).camera
+    return row.model_copy(update={"sensor": sensor} | ({} if camera == DepthCamera() else {"camera": camera}))
 
 
 def level(points: Points, pitch_rad: float, roll_rad: float = 0.0) -> Points:

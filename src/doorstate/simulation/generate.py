@@ -5,19 +5,19 @@ from __future__ import annotations
 
 import hashlib
 import math
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, SerializerFunctionWrapHandler, model_serializer
 
 from doorstate.errors import ConfigError
 from doorstate.simulation.frames import Frame as Frame
 from doorstate.simulation.frames import level as level
-from doorstate.simulation.frames import looks_into, opening_depth_m, same_image
+from doorstate.simulation.frames import looks_into, opening_depth_m, same_image, sensed_by
 from doorstate.simulation.frames import replay as replay
 from doorstate.simulation.placement import draw_heading_rad, half_ring, reduced_ring
 from doorstate.simulation.scene import Box, Door, build_scene
-from doorstate.simulation.sensor import CameraPose, DepthCamera
+from doorstate.simulation.sensor import CameraPose, DepthCamera, cut_range
 from doorstate.types import DoorState, Part
 
 
@@ -88,6 +88,12 @@ class SampleRow(BaseModel):
     visible_opening_px: int = 0
     same_image_as: str = ""
     depth_sha256: str = ""
+    sensor: str = "none"
+
+    @model_serializer(mode="wrap")
+    def _without_what_is_not_given(self, fields: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        # Manifests without a sensor have no column for one.
+        return {name: value for name, value in fields(self).items() if (name, value) != ("sensor", "none")}
 
     def camera_pose(self) -> CameraPose:
         """The camera in the door frame."""
@@ -138,18 +144,22 @@ def draw_pose(preset: Preset, seed: int, index: int) -> list[SampleRow]:
     return rows
 
 
-def simulate_pose(preset: Preset, seed: int, index: int) -> tuple[list[SampleRow], list[Frame]]:
+def simulate_pose(
+    preset: Preset, seed: int, index: int, sensor: str = "none"
+) -> tuple[list[SampleRow], list[Frame]]:
     """Draw and render the three samples of one pose and fill in what can be seen of the door."""
-    rows = draw_pose(preset, seed, index)
+    rows = [sensed_by(row, sensor) for row in draw_pose(preset, seed, index)]
     frames = [replay(row) for row in rows]
     size = preset.door.opening_width_m, preset.door.opening_height_m
-    opening_m = opening_depth_m(rows[0].camera_pose(), preset.camera.intrinsics(), *size)
+    opening_m = opening_depth_m(rows[0].camera_pose(), rows[0].camera.intrinsics(), *size)
+    # Two states that are the same but for a sensor's noise are still the same.
+    clean = [cut_range(frame.full, row.camera).depth_m for row, frame in zip(rows, frames, strict=True)]
     filled = []
-    for row, frame in zip(rows, frames, strict=True):
+    for row, frame, depth_m in zip(rows, frames, clean, strict=True):
         twins = [
             other.state
-            for other, other_frame in zip(rows, frames, strict=True)
-            if other.state != row.state and same_image(frame.cut.depth_m, other_frame.cut.depth_m)
+            for other, other_m in zip(rows, clean, strict=True)
+            if other.state != row.state and same_image(depth_m, other_m)
         ]
         part = frame.cut.part
         filled.append(

@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, field_serializer, field_validator
 from doorstate.simulation.door_draws import state_of
 from doorstate.simulation.doors import Opening, passable_width_m
 from doorstate.simulation.draws import Draws
-from doorstate.simulation.frames import Frame, looks_into, opening_depth_m, replay, same_image
+from doorstate.simulation.frames import Frame, looks_into, opening_depth_m, replay, same_image, sensed_by
 from doorstate.simulation.occlusion import DoorView, occluded_bin
 from doorstate.simulation.scene import Box
 from doorstate.simulation.scene_draws import (
@@ -25,7 +25,7 @@ from doorstate.simulation.scene_draws import (
     draw_varied_angles,
 )
 from doorstate.simulation.scenes import Scene, clutter_boxes, scene_boxes
-from doorstate.simulation.sensor import CameraPose, DepthCamera
+from doorstate.simulation.sensor import CameraPose, DepthCamera, cut_range
 from doorstate.types import NO_DOOR, DepthImage, Part
 
 PresetName = Literal["varied", "varied-angles", "cluttered", "no-door"]
@@ -52,9 +52,9 @@ SCENE_PRESETS = {name: ScenePreset(name=name) for name in _DRAWS}
 class SceneRow(BaseModel):
     """One line of the manifest of a preset of many scenes.
 
-    `scene`, the opening, the camera's columns and `sensor*` rebuild the frame; the others describe it. Poses are in the
-    door frame (simulation.scene) but for `door_*`, which is the door frame in the sensor frame. What a scene without a
-    door, or a door that slides, does not have is empty.
+    `scene`, the opening, camera, sensor, seed and name rebuild the frame; the others describe it. Poses are in the door
+    frame (simulation.scene) but for `door_*`, which is the door frame in the sensor frame. What a scene without a door,
+    or a door that slides, does not have is empty.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
@@ -88,6 +88,7 @@ class SceneRow(BaseModel):
     door_z_m: float | None = None
     door_yaw_deg: float | None = None
     seed: int
+    sensor: str = "none"
     camera: DepthCamera
     scene: Scene
     clutter_tries: int = 0
@@ -191,17 +192,21 @@ def _of_opening(row: SceneRow, opening: Opening, name: str | None) -> dict[str, 
     }
 
 
-def simulate_scene(preset: ScenePreset, seed: int, index: int) -> tuple[list[SceneRow], list[Frame]]:
+def simulate_scene(
+    preset: ScenePreset, seed: int, index: int, sensor: str = "none"
+) -> tuple[list[SceneRow], list[Frame]]:
     """Draw and render the samples of one scene and fill in what can be seen of its door."""
-    rows = draw_scene(preset, seed, index)
+    rows = [sensed_by(row, sensor) for row in draw_scene(preset, seed, index)]
     frames = [replay(row) for row in rows]
     opening_m = _opening_m(rows[0])
+    # Two states that are the same but for a sensor's noise are still the same.
+    clean = [cut_range(frame.full, row.camera).depth_m for row, frame in zip(rows, frames, strict=True)]
     filled = []
-    for row, frame in zip(rows, frames, strict=True):
+    for row, frame, depth_m in zip(rows, frames, clean, strict=True):
         twins = {
             other.state
-            for other, other_frame in zip(rows, frames, strict=True)
-            if other.state != row.state and same_image(frame.cut.depth_m, other_frame.cut.depth_m)
+            for other, other_m in zip(rows, clean, strict=True)
+            if other.state != row.state and same_image(depth_m, other_m)
         }
         described = _of_frame(row, frame, opening_m) | {"same_image_as": " ".join(sorted(twins))}
         filled.append(row.model_copy(update=described))
