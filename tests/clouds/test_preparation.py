@@ -121,3 +121,22 @@ def test_thinning_names_the_pixels_of_the_whole_cloud() -> None:
     assert set(rows % step) == set(columns % step) == {0}
     few = prepare_cloud(image[:16, :16], 140, thin=True)
     np.testing.assert_array_equal(few.points, prepare_cloud(image[:16, :16], 140).points)
+
+
+def test_what_lies_too_far_ahead_is_left_out_whole_or_thinned() -> None:
+    cloud = np.random.default_rng(4).uniform(0.5, 9, (60, 80, 3)).astype(np.float32)
+    for thin in (False, True):
+        prepared = prepare_cloud(cloud, 200, thin=thin, max_depth_m=5.0)
+        assert len(prepared.points) == 200
+        assert prepared.points[:, 0].max() <= 5
+        assert np.array_equal(cloud.reshape(-1, 3)[prepared.indices], prepared.points)
+        near = np.where(cloud[..., :1] <= 5, cloud, np.nan)
+        assert np.array_equal(prepare_cloud(near, 200, thin=thin).points, prepared.points)
+
+
+def test_nothing_within_reach_is_told() -> None:
+    cloud = np.full((400, 3), 7.0, np.float32) + np.random.default_rng(0).normal(0, 0.1, (400, 3)).astype(
+        np.float32
+    )
+    with pytest.raises(CloudContentError, match="too few points: 0 within 5 m"):
+        prepare_cloud(cloud, 200, max_depth_m=5.0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -249,3 +250,21 @@ def test_an_unsure_answer_is_none_where_the_weights_say_so(small_dataset: Prepar
         assert (asked.state == answer.state) == answers_it
         assert answers_it or asked.reason.startswith(f"unsure: {answer.state.label} has {best:.2f}")
         assert asked.probabilities == answer.probabilities
+
+
+def test_weights_that_saw_five_metres_look_no_farther(small_dataset: PreparedDataset) -> None:
+    network = create_network("pointnet2")
+    room = small_dataset.cloud(2)
+    corridor = np.concatenate([room, room + np.array([8, 0, 0], np.float32)])
+    near, far = (WeightsCard(network="pointnet2", num_points=160, max_depth_m=reach) for reach in (5.0, None))
+    assert Predictor(network, near, 160)(corridor) == replace(
+        Predictor(network, near, 160)(room), milliseconds=pytest.approx(0, abs=1e4)
+    )
+    assert (
+        Predictor(network, far, 160)(corridor).probabilities
+        != Predictor(network, far, 160)(room).probabilities
+    )
+
+
+def test_a_run_on_simulated_clouds_says_how_far_its_camera_saw(small_dataset: PreparedDataset) -> None:
+    assert small_dataset.max_depth_m == 5.0

@@ -30,7 +30,9 @@ class PreparedCloud(NamedTuple):
     indices: Indices  # (n,)
 
 
-def prepare_cloud(points: Points, count: int = NUM_POINTS, *, thin: bool = False) -> PreparedCloud:
+def prepare_cloud(
+    points: Points, count: int = NUM_POINTS, *, thin: bool = False, max_depth_m: float | None = None
+) -> PreparedCloud:
     """Drop unmeasured points, check what is left, and keep `count` points in farthest-point order.
 
     A cloud with fewer than `count` distinct points gives all of them, each once; points are never repeated.
@@ -41,13 +43,15 @@ def prepare_cloud(points: Points, count: int = NUM_POINTS, *, thin: bool = False
         count: how many points to keep.
         thin: of an organized cloud look at every second, third, ... row and column only, as long as 16 times `count`
             pixels remain: several times quicker, and no point moves by more than a few pixels.
+        max_depth_m: leave out what lies farther ahead, along x: farthest-point sampling spreads over space, and what a
+            network has never seen, such as the end of a corridor, would take most of its points.
 
     Raises:
         CloudContentError: empty, nothing measured, too few points, or units that cannot be metres.
     """
     if thin:
         pixels = _thinned_pixels(points.shape, count)
-        prepared = prepare_cloud(np.asarray(points).reshape(-1, 3)[pixels], count)
+        prepared = prepare_cloud(np.asarray(points).reshape(-1, 3)[pixels], count, max_depth_m=max_depth_m)
         return PreparedCloud(prepared.points, pixels[prepared.indices])
     flat = np.asarray(points, dtype=np.float32).reshape(-1, 3)
     if len(flat) == 0:
@@ -64,6 +68,13 @@ def prepare_cloud(points: Points, count: int = NUM_POINTS, *, thin: bool = False
     if len(clean) < MIN_POINTS:
         raise CloudContentError(f"too few points: {len(clean)} measured, at least {MIN_POINTS} are needed")
     _check_units(clean)
+    if max_depth_m is not None:
+        measured = measured[clean[:, 0] <= max_depth_m]
+        clean = flat[measured]
+        if len(clean) < MIN_POINTS:
+            raise CloudContentError(
+                f"too few points: {len(clean)} within {max_depth_m:g} m, at least {MIN_POINTS} are needed"
+            )
     chosen = _without_repeats(farthest_point_indices(clean, min(count, len(clean))))
     if len(chosen) < min(count, MIN_POINTS):
         raise CloudContentError(

@@ -73,6 +73,12 @@ class PreparedDataset:
         return self.description.num_points
 
     @property
+    def max_depth_m(self) -> float | None:
+        """How far the simulated camera saw, the farthest if there are several; None where nobody knows."""
+        known = {row.get("camera.max_depth_m", "") for row in self.rows}
+        return None if "" in known else max(map(float, known), default=None)
+
+    @property
     def clouds(self) -> NDArray[np.float32]:
         """(M, n, 3) metres.
 

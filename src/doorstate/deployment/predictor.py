@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from doorstate.clouds.preparation import NUM_POINTS, prepare_cloud
+from doorstate.clouds.preparation import NUM_POINTS, PreparedCloud, prepare_cloud
 from doorstate.deployment.gate import Gate
 from doorstate.deployment.onnx_network import OnnxNetwork
 from doorstate.errors import ConfigError, MissingExtraError, WeightsError
@@ -187,7 +187,7 @@ class Predictor:
             CloudContentError: one of the clouds cannot be used.
         """
         started = self.clock()
-        prepared = [prepare_cloud(cloud, self.points, thin=self.thin) for cloud in clouds]
+        prepared = [self.prepare(cloud) for cloud in clouds]
         reasons = [None if self.gate is None else self.gate(cloud) for cloud in clouds]
         asked = [number for number, reason in enumerate(reasons) if reason is None]
         said: dict[int, _Said] = {}
@@ -202,6 +202,14 @@ class Predictor:
             self._prediction(said.get(number), len(cloud.points), milliseconds, reasons[number])
             for number, cloud in enumerate(prepared)
         ]
+
+    def prepare(self, points: Points) -> PreparedCloud:
+        """What of a cloud the network looks at.
+
+        Raises:
+            CloudContentError: as for a call.
+        """
+        return prepare_cloud(points, self.points, thin=self.thin, max_depth_m=self.card.max_depth_m)
 
     def _prediction(
         self, said: _Said | None, points: int, milliseconds: float, refused: str | None

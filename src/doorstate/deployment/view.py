@@ -40,7 +40,7 @@ def look(predictor: Predictor | RulePredictor, sighting: Sighting) -> Entry:
             raise sighting.cloud
         answer = predictor(sighting.cloud)
         if isinstance(predictor, Predictor):
-            prepared = prepare_cloud(sighting.cloud, predictor.points, thin=predictor.thin)
+            prepared = predictor.prepare(sighting.cloud)
         else:
             prepared = prepare_cloud(sighting.cloud, NUM_POINTS, thin=True)
     except DoorstateError as error:

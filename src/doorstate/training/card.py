@@ -21,6 +21,7 @@ class WeightsCard(BaseModel):
     heads: tuple[str, ...] = ()  # answers besides the state
     scale_m: float = SCALE_M
     states: tuple[str, ...] = STATES
+    max_depth_m: float | None = Field(default=None, gt=0)  # how far the camera of the training clouds saw
     temperature: float = Field(default=1.0, gt=0)  # logits are divided by it (training.calibration)
     abstain_below: float = Field(default=0.0, ge=0, lt=1)  # no state from a probability below this
     trained_on: str = ""

@@ -352,6 +352,7 @@ class _Trainer:
             network_options=_network_options(config),
             num_points=config.num_points,
             heads=config.heads,
+            max_depth_m=self.dataset.max_depth_m,
             trained_on=f"{self.dataset.description.source}, protocol {config.protocol}, fold {config.fold}",
         )
 
