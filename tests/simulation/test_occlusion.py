@@ -35,6 +35,13 @@ def test_half_a_door_is_hidden_by_what_stands_before_its_left_half(angle_deg: fl
     assert view(angle_deg).occluded_share([half._replace(center_m=(0.0, 2.0, 1.2))]) == 1.0
 
 
+def test_a_camera_that_is_larger_or_not_centred_gives_much_the_same_share() -> None:
+    half = Box(Part.OTHER, (0.5, 0.02, 1.2), (1.0, 0.001, 2.4))
+    off_centre = DepthCamera(width=640, height=480, cx_px=310.0, cy_px=250.0)
+    share = DoorView(SCENE, Opening(), AHEAD, off_centre).occluded_share([half])
+    assert share == pytest.approx(view(0).occluded_share([half]), abs=0.01)
+
+
 def test_nothing_and_what_stands_elsewhere_hide_nothing() -> None:
     assert view(0).occluded_share([]) == 0
     behind = Box(Part.OTHER, (0.0, -1.0, 1.0), (0.4, 0.4, 2.0))

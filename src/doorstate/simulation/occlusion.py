@@ -20,12 +20,13 @@ _COLUMNS = 160
 class DoorView:
     """The pixels of a door that nothing stands before: those of its leaf, of its frame, and into its opening.
 
-    The image is that of the camera with 160 columns: shares are much the same in the others, and take their time.
+    The image is that of the camera with 160 columns and centred: shares are much the same in the others, and take time.
     """
 
     def __init__(self, scene: Scene, opening: Opening, pose: CameraPose, camera: DepthCamera) -> None:
         assert scene.door is not None
-        size = {"width": _COLUMNS, "height": round(_COLUMNS * camera.height / camera.width)}
+        height = round(_COLUMNS * camera.height / camera.width)
+        size = {"width": _COLUMNS, "height": height, "cx_px": None, "cy_px": None}
         self._pose, self._intrinsics = pose, camera.model_copy(update=size).intrinsics()
         alone = scene.model_copy(update={"items": ()})
         seen = render_behind_glass(scene_boxes(alone, opening), pose, self._intrinsics)
