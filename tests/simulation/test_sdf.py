@@ -9,7 +9,8 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 
-from doorstate.simulation.frames import replay
+from doorstate.errors import ConfigError
+from doorstate.simulation.frames import replay, sensed_by
 from doorstate.simulation.generate import PRESETS, draw_pose
 from doorstate.simulation.manifest import Row
 from doorstate.simulation.scene import Box
@@ -76,3 +77,8 @@ def test_a_world_read_back_gives_the_same_boxes_and_the_same_depth(row: Row) -> 
     assert pose == row.camera_pose()
     depth = cut_range(render_behind_glass(boxes, pose, camera.intrinsics()), camera).depth_m
     np.testing.assert_allclose(depth, replay(row).cut.depth_m, atol=1e-6)
+
+
+def test_a_camera_that_gazebo_does_not_have_is_refused() -> None:
+    with pytest.raises(ConfigError, match="not centred"):
+        sdf_world(sensed_by(ROWS[0], "deepdoors2"), "world")

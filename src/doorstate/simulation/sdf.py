@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import xml.etree.ElementTree as ET
 
+from doorstate.errors import ConfigError
 from doorstate.simulation.frames import Sample
 from doorstate.simulation.scene import Box
 from doorstate.simulation.sensor import CameraPose, DepthCamera
@@ -19,7 +20,13 @@ _GLASS_TRANSPARENCY = 0.8
 
 
 def sdf_world(row: Sample, name: str) -> str:
-    """The world of a row, as XML text that reads back to the same numbers."""
+    """The world of a row, without its sensor's noise, as XML text that reads back to the same numbers.
+
+    Raises:
+        ConfigError: the camera is not centred, as Gazebo's are.
+    """
+    if row.camera.cx_px is not None or row.camera.cy_px is not None:
+        raise ConfigError(f"{name}: its camera is not centred, as Gazebo's are; take a row of another sensor")
     sdf = ET.Element("sdf", version="1.7")
     world = ET.SubElement(sdf, "world", name=name)
     light = ET.SubElement(world, "light", name="sun", type="directional")
