@@ -32,6 +32,7 @@ COMMANDS = (
     "report",
     "resolution",
     "predict",
+    "evaluate",
     "view",
     "serve",
     "export",

@@ -118,8 +118,8 @@ const clouds = (() => {
     // Flying pixels far off must not make the rest small.
     const span = (values) => {
       const sorted = values.slice().sort();
-      const [low, high] = [0.01, 0.99].map((share) => sorted[Math.round(share * (sorted.length - 1))]);
-      const margin = 0.08 * (high - low);
+      const [low, high] = [0.05, 0.95].map((share) => sorted[Math.round(share * (sorted.length - 1))]);
+      const margin = 0.2 * (high - low);
       return [Math.max(sorted[0], low - margin), Math.min(sorted[sorted.length - 1], high + margin)];
     };
     const [[left, rightmost], [bottom, top]] = [span(u), span(v)];
