@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable
 from pathlib import Path
@@ -192,3 +193,17 @@ def test_prepare_takes_the_layout(root: Path, tmp_path: Path, run: Run) -> None:
     assert err.startswith("doorstate: --layout says how its files are read")
     # The same folder without the layout is another preparation.
     assert "holds a preparation of something else" in run("prepare", part, "--points", 128, "--out", out)[2]
+
+
+def test_evaluate_takes_the_layout(root: Path, run: Run) -> None:
+    part = root / "Door Classification" / "Depth" / "Test"
+    code, out, err = run(
+        "evaluate", part, "--layout", "deepdoors2", "--rule", "plane_state", "--by", "split", "--json"
+    )
+    assert (code, err) == (0, "")
+    metrics = json.loads(out)
+    found = metrics["methods"]["plane_state"]
+    assert metrics["states"] == {"closed": 1, "semi_open": 1, "open": 1}
+    assert found["by"]["split"]["test"]["frames"] == 3
+    # A rule that tells angles needs the doors upright and in true proportion.
+    assert found["all"]["right"] >= 2
