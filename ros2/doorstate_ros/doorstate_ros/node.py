@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import rclpy
@@ -142,7 +142,7 @@ def markers(header: Header, report: Report, shown_for: Duration) -> list[Marker]
     return drawn
 
 
-def point(place_m: Sequence[float]) -> Point:
+def point(place_m: Iterable[float]) -> Point:
     x, y, z = (float(metres) for metres in place_m)
     return Point(x=x, y=y, z=z)
 
