@@ -225,6 +225,20 @@ def gate(
 
 
 @app.command()
+def sensors(
+    out: Out,
+    frames: Annotated[int, typer.Option(help="Frames of every measure.", min=1)] = 16,
+) -> None:
+    """Noise, steps, shadows and losses of the sensor models beside what is published of the sensors."""
+    from benchmarks.sensors import measure, sensors_table
+    from doorstate.console import progress_bar
+
+    with progress_bar("sensors") as progress:
+        rows = measure(range(frames), progress)
+    _finish(out, "sensors", rows, sensors_table(rows), frames=frames)
+
+
+@app.command()
 def service(
     out: Out,
     seconds: Annotated[float, typer.Option(help="Of every number of clients.", min=0.1)] = 60.0,

@@ -39,7 +39,7 @@ def hide_from_second_view(depth_m: DepthImage, view: SecondView, focal_px: float
     column = np.arange(depth_m.shape[1], dtype=np.float32) - disparity
     hidden = _covered(disparity, np.floor(column).astype(np.int32), view.tolerance_px)
     if view.is_imager:
-        hidden |= (column < 0) & (disparity > 0)
+        hidden |= (column < -0.5) & (disparity > 0)
     return np.where(hidden, np.float32(np.nan), depth_m)
 
 

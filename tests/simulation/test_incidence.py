@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a rendering tells of its boxes: angle of incidence, material, what is behind glass; cameras off centre."""
+
+from __future__ import annotations
+
+import math
+
+import naive_caster
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from doorstate.clouds.camera import Intrinsics
+from doorstate.simulation.scene import Box
+from doorstate.simulation.sensor import (
+    NO_BOX,
+    CameraPose,
+    DepthCamera,
+    cut_range,
+    incidence,
+    is_made_of,
+    render,
+    render_behind_glass,
+)
+from doorstate.types import Part
+
+CAMERA = Intrinsics.from_hfov(18, 14, math.radians(70))
+LEVEL = CameraPose(0.0, 0.0, 0.0, 0.0)
+WALL = Box(Part.WALL, (3.5, 0.0, 0.0), (1.0, 50.0, 50.0))
+PANE = Box(Part.LEAF, (2.0, 0.0, 0.0), (0.01, 1.0, 50.0), material="glass")
+
+
+def angle_to_face(box: Box, pose: CameraPose, row: int, column: int, depth_m: float) -> float:
+    """By the face that the hit point lies nearest to, relative to nothing but the box's own frame."""
+    ray = naive_caster.pixel_ray(row, column, pose, CAMERA)
+    hit = tuple(a + depth_m * b - c for a, b, c in zip(pose[:3], ray, box.center_m, strict=True))
+    local, direction = (naive_caster.turn_z(vector, -box.yaw_rad) for vector in (hit, ray))
+    gaps = [abs(abs(at) - size / 2) for at, size in zip(local, box.size_m, strict=True)]
+    face = gaps.index(min(gaps))
+    return math.acos(abs(direction[face]) / math.hypot(*direction))
+
+
+@given(seed=st.integers(0, 2**32 - 1))
+@settings(deadline=None, max_examples=40)
+def test_incidence_is_the_angle_between_the_ray_and_the_face_it_hits(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    yaw, pitch = rng.uniform(-1, 1, 2).tolist()
+    pose = CameraPose(0.1, -0.2, 0.3, yaw, pitch / 2)
+    boxes = [
+        Box(
+            Part.OTHER, tuple(rng.uniform(-4, 4, 3)), tuple(rng.uniform(0.5, 3, 3)), float(rng.uniform(-4, 4))
+        )
+        for _ in range(5)
+    ]
+    inside = [(np.abs(np.array(pose[:3]) - box.center_m) < 3).all() for box in boxes]
+    boxes = [box for box, holds_camera in zip(boxes, inside, strict=True) if not holds_camera]
+    seen = render(boxes, pose, CAMERA)
+    found = incidence(seen, boxes, pose, CAMERA)
+    assert ((found >= 0) & (found <= np.float32(math.pi / 2))).all()
+    for row, column in np.argwhere(seen.box != NO_BOX).tolist():
+        box = boxes[seen.box[row, column]]
+        expected = angle_to_face(box, pose, row, column, float(seen.depth_m[row, column]))
+        # On an edge of the box, either face is right: the hit point, a float32, tells no more.
+        assert found[row, column] == pytest.approx(expected, abs=1e-4) or on_edge(
+            seen.depth_m, row, column, box, pose
+        )
+    assert (found[seen.box == NO_BOX] == 0).all()
+
+
+def on_edge(depth_m: np.ndarray, row: int, column: int, box: Box, pose: CameraPose) -> bool:
+    ray = naive_caster.pixel_ray(row, column, pose, CAMERA)
+    hit = tuple(
+        a + float(depth_m[row, column]) * b - c for a, b, c in zip(pose[:3], ray, box.center_m, strict=True)
+    )
+    local = naive_caster.turn_z(hit, -box.yaw_rad)
+    return sum(abs(abs(at) - size / 2) < 1e-4 for at, size in zip(local, box.size_m, strict=True)) > 1
+
+
+def test_incidence_of_a_wall_ahead_is_the_angle_off_the_axis() -> None:
+    found = incidence(render([WALL], LEVEL, CAMERA), [WALL], LEVEL, CAMERA)
+    right = (np.arange(18) - CAMERA.cx)[None, :] / CAMERA.fx
+    down = (np.arange(14) - CAMERA.cy)[:, None] / CAMERA.fy
+    np.testing.assert_allclose(found, np.arctan(np.hypot(right, down)), atol=1e-6)
+
+
+def test_behind_glass_is_the_next_opaque_surface_with_its_own_number() -> None:
+    boxes = [PANE, WALL]
+    front, behind = render(boxes, LEVEL, CAMERA), render_behind_glass(boxes, LEVEL, CAMERA)
+    pane = is_made_of("glass", front, boxes)
+    assert 0 < pane.sum() < pane.size
+    assert (front.depth_m[pane] == np.float32(1.995)).all()
+    assert (front.box == np.where(pane, 0, 1)).all()
+    assert (behind.depth_m == 3).all()
+    assert (behind.box == 1).all()
+    assert not is_made_of("glass", behind, boxes).any()
+
+
+def test_what_is_cut_belongs_to_no_box_and_is_made_of_nothing() -> None:
+    boxes = [PANE, WALL]
+    cut = cut_range(render(boxes, LEVEL, CAMERA), DepthCamera(max_depth_m=2.5))
+    lost = np.isnan(cut.depth_m)
+    assert 0 < lost.sum() < lost.size
+    assert ((cut.box == NO_BOX) == lost).all()
+    assert ((cut.part == Part.NONE) == lost).all()
+    assert (is_made_of("matte", cut, boxes) == 0).all()
+
+
+def test_a_camera_off_centre_says_so_and_an_ordinary_one_says_nothing_new() -> None:
+    camera = DepthCamera(cx_px=300.25, cy_px=17.0)
+    assert (camera.intrinsics().cx, camera.intrinsics().cy) == (300.25, 17.0)
+    assert camera.intrinsics().fx == DepthCamera().intrinsics().fx
+    assert DepthCamera.model_validate(camera.model_dump()) == camera
+    assert list(DepthCamera().model_dump()) == ["width", "height", "hfov_deg", "min_depth_m", "max_depth_m"]
