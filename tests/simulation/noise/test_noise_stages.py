@@ -51,7 +51,7 @@ STAGES: dict[str, Callable[[DepthImage, np.random.Generator], DepthImage]] = {
     ),
     "disparity": lambda depth, rng: round_disparity(depth, STEPS, FOCAL_PX),
     "grazing": lambda depth, rng: lose_grazing(depth, zeros(depth), Grazing(), rng),
-    "edges": lambda depth, rng: blur_edges(depth, Edges(), rng),
+    "edges": lambda depth, rng: blur_edges(depth, depth, Edges(), rng),
     "speckle": lambda depth, rng: lose_speckle(depth, Speckle(share=0.2, side_px=3), rng),
     "depth steps": lambda depth, rng: round_depth(depth, DepthSteps(step_m=1 / 16, bits=8)),
 }
@@ -146,7 +146,7 @@ def test_an_8_bit_file_keeps_no_depth_below_half_a_step_nor_beyond_its_bits() ->
 def test_a_jump_gives_nothing_or_a_depth_between_and_nothing_else_changes() -> None:
     depth_m = np.full((4000, 6), 2.0, np.float32)
     depth_m[:, 3:] = 2.5
-    after = blur_edges(depth_m, Edges(), stage_rng(1, "edges"))
+    after = blur_edges(depth_m, depth_m, Edges(), stage_rng(1, "edges"))
     aside, beside = after[:, [0, 1, 4, 5]], after[:, 2:4]
     np.testing.assert_array_equal(aside, depth_m[:, [0, 1, 4, 5]])
     assert np.isnan(beside).mean() == pytest.approx(0.5, abs=0.02)
@@ -154,11 +154,15 @@ def test_a_jump_gives_nothing_or_a_depth_between_and_nothing_else_changes() -> N
     between = (left > 2.0) & (left < 2.5)
     assert between.mean() == pytest.approx(0.1, abs=0.02)
     assert ((left >= 2.0) & (left <= 2.5)).all()
+    # A jump of the measurements alone is noise.
+    np.testing.assert_array_equal(
+        blur_edges(depth_m, zeros(depth_m), Edges(lost=1), stage_rng(1, "edges")), depth_m
+    )
     # Four per cent is no jump; a lost neighbour is no surface; the sky is a jump, but nothing flies there.
     flat = np.array([[2.0, 2.08, 2.0, np.nan, 2.5]], np.float32)
-    np.testing.assert_array_equal(blur_edges(flat, Edges(lost=1), stage_rng(0, "edges")), flat)
+    np.testing.assert_array_equal(blur_edges(flat, flat, Edges(lost=1), stage_rng(0, "edges")), flat)
     sky = np.tile(np.array([[2.0, np.inf]], np.float32), (200, 1))
-    torn = blur_edges(sky, Edges(flying=1), stage_rng(0, "edges"))
+    torn = blur_edges(sky, sky, Edges(flying=1), stage_rng(0, "edges"))
     assert np.isinf(torn[:, 1]).all()
     assert set(np.unique(torn[:, 0][~np.isnan(torn[:, 0])]).tolist()) == {2.0}
     assert np.isnan(torn[:, 0]).mean() == pytest.approx(0.5, abs=0.12)

@@ -20,12 +20,20 @@ class Edges(BaseModel):
     flying: float = Field(default=0.1, ge=0, le=1)  # of those not lost
 
 
-def blur_edges(depth_m: DepthImage, edges: Edges, rng: np.random.Generator) -> DepthImage:
+def blur_edges(
+    depth_m: DepthImage, surface_m: DepthImage, edges: Edges, rng: np.random.Generator
+) -> DepthImage:
     """NaN, or anywhere between both depths, in pixels beside a jump.
 
     A pixel that was lost is no other surface, and one that sees nothing (inf) is no depth to fly to.
+
+    Args:
+        depth_m: (H, W) metres, as measured.
+        surface_m: (H, W) metres, before noise: far away, noise alone makes jumps that are no edges.
+        edges: what a jump is, and what it does.
+        rng: of this stage.
     """
-    other = _across(depth_m, edges.jump).ravel()
+    other = _across(depth_m, surface_m, edges.jump).ravel()
     beside = np.flatnonzero(~np.isnan(other))
     lost, flies, share = rng.random((3, len(beside)), dtype=np.float32)
     mixed = depth_m.copy()
@@ -38,16 +46,16 @@ def blur_edges(depth_m: DepthImage, edges: Edges, rng: np.random.Generator) -> D
     return mixed
 
 
-def _across(depth_m: DepthImage, jump: float) -> NDArray[np.float32]:
-    """Depth on the other side of a jump, NaN where there is none."""
+def _across(depth_m: DepthImage, surface_m: DepthImage, jump: float) -> NDArray[np.float32]:
+    """Depth measured on the other side of a jump, NaN where there is none."""
     other = np.full(depth_m.shape, np.nan, np.float32)
-    for one, two, mine, its in (
-        (depth_m[:, :-1], depth_m[:, 1:], other[:, :-1], other[:, 1:]),
-        (depth_m[:-1], depth_m[1:], other[:-1], other[1:]),
+    for one, two in (
+        (np.s_[:, :-1], np.s_[:, 1:]),
+        (np.s_[:-1, :], np.s_[1:, :]),
     ):
-        apart = np.minimum(one, two)
+        apart = np.minimum(surface_m[one], surface_m[two])
         apart *= np.float32(1 + jump)
-        jumps = np.maximum(one, two) > apart
-        np.copyto(mine, two, where=jumps)
-        np.copyto(its, one, where=jumps)
+        jumps = np.maximum(surface_m[one], surface_m[two]) > apart
+        np.copyto(other[one], depth_m[two], where=jumps)
+        np.copyto(other[two], depth_m[one], where=jumps)
     return other

@@ -194,7 +194,7 @@ def distort(
         moves = draw_moves(seen, angle_rad, model.lateral, stage_rng(seed, "lateral"))
         seen = Render(_moved(seen.depth_m, *moves), _moved(seen.part, *moves), _moved(seen.box, *moves))
         angle_rad = _moved(angle_rad, *moves)
-    depth_m = seen.depth_m
+    depth_m = surface_m = seen.depth_m
     if model.axial is not None:
         depth_m = _with_axial_noise(model, depth_m, angle_rad, intrinsics.fx, seed)
     if model.disparity_steps is not None:
@@ -202,7 +202,7 @@ def distort(
     if model.grazing is not None:
         depth_m = lose_grazing(depth_m, angle_rad, model.grazing, stage_rng(seed, "grazing"))
     if model.edges is not None:
-        depth_m = blur_edges(depth_m, model.edges, stage_rng(seed, "edges"))
+        depth_m = blur_edges(depth_m, surface_m, model.edges, stage_rng(seed, "edges"))
     if model.speckle is not None:
         depth_m = lose_speckle(depth_m, model.speckle, stage_rng(seed, "speckle"))
     if model.depth_steps is not None:
