@@ -5,7 +5,9 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
+import json
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -29,6 +31,7 @@ from doorstate.simulation.sensor import (
 )
 from doorstate.types import Part
 
+REPOSITORY = Path(__file__).resolve().parents[3]
 POSE = CameraPose.of_degrees((0.4, 2.2, 1.0), -97.0, 3.0)
 # Hinged on the right: the free edge, before what is behind it, is the leaf's left one, where shadows fall.
 BOXES = build_scene(Door(hinge="right"), math.radians(50))
@@ -63,6 +66,19 @@ def test_axial_noise_and_steps_are_those_of_the_table_in_millimetres(checks: lis
             assert found[name, "axial noise", f"{depth_m:g} m"] == pytest.approx(sigma_mm, rel=0.1)
     for depth_m, step_mm in STEPS_MM.items():
         assert found["xtion", "step of disparity", f"{depth_m:g} m"] == pytest.approx(step_mm, rel=0.1)
+
+
+def test_the_page_shows_what_was_stored() -> None:
+    page = (REPOSITORY / "docs" / "sensors.md").read_text(encoding="utf-8")
+    stored = json.loads((REPOSITORY / "docs" / "benchmarks" / "sensors.json").read_text(encoding="utf-8"))
+    rows = stored["groups"]["all"]["rows"]
+    for name in set(SENSORS) - {"none"}:
+        cells = [
+            f"{row['published']:.1f} / {row['measured']:.1f}"
+            for row in rows
+            if (row["sensor"], row["measure"]) == (name, "axial noise") and "degrees" not in row["at"]
+        ]
+        assert f"| `{name}` | {' | '.join(cells)} |" in page
 
 
 def small(name: str) -> tuple[SensorModel, DepthCamera]:
