@@ -30,8 +30,8 @@ PROTOCOLS = {
         "nobody in that fold: no near-copy of a test cloud was trained on."
     ),
     "by-scene": (
-        "A door in its room, with all that was seen of it, stays on one side of a fold: doors and rooms that are tested "
-        "were never trained on."
+        "A door in its room, with all that was seen of it, stays on one side of a fold: tested doors and rooms were "
+        "never trained on."
     ),
     "all": "Everything was trained on and nothing tested.",
 }
