@@ -43,7 +43,10 @@ python_use_unqualified_type_names = True
 # Types in signatures that lead nowhere: those of other projects, as asking their sites for addresses would need the
 # network, and those behind the commands. What clouds, rules, networks and deployment take and give has its place here.
 nitpick_ignore_regex = [
-    ("py:.*", r"(numpy|np|torch|pydantic|annotated_types|collections|pathlib|typing|types|fastapi|enum|abc)\..*"),
+    (
+        "py:.*",
+        r"(numpy|np|torch|pydantic|annotated_types|collections|pathlib|typing|types|fastapi|enum|abc)\..*",
+    ),
     ("py:.*", r"doorstate\.(simulation|dataset|training|evaluation|rules\.walls)\..*"),
     (
         "py:.*",
