@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import http.client
-import os
 import signal
 import socket
 import threading
@@ -137,7 +136,9 @@ def listen_and_stop(port: int, wanted: str, heard: list[str]) -> None:
         while wanted not in "".join(heard):
             heard.append(answer.readline().decode())
     finally:
-        os.kill(os.getpid(), signal.SIGINT)
+        main_thread = threading.main_thread().ident
+        assert main_thread is not None
+        signal.pthread_kill(main_thread, signal.SIGINT)
 
 
 def live(view: Run, wanted: str, *arguments: object) -> tuple[tuple[int, str, str], str]:

@@ -215,7 +215,9 @@ def _show_live(predictor: Any, sightings: Iterable[Sighting], port: int, open_br
             for sighting in sightings:
                 page.publish("cloud", look(predictor, sighting))
             page.publish("end", None)
-            threading.Event().wait()
+            # Not for ever at once: where another thread is given Ctrl-C, this one learns of it when it wakes.
+            while not threading.Event().wait(0.5):
+                pass
         except KeyboardInterrupt:
             err.print("stopped")
 
