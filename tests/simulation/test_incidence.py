@@ -84,16 +84,38 @@ def test_incidence_of_a_wall_ahead_is_the_angle_off_the_axis() -> None:
     np.testing.assert_allclose(found, np.arctan(np.hypot(right, down)), atol=1e-6)
 
 
+def test_incidence_of_a_floor_is_the_complement_of_the_ray_below_the_horizon() -> None:
+    floor = Box(Part.FLOOR, (0.0, 0.0, -1.05), (50.0, 50.0, 0.1))
+    seen = render([floor], LEVEL, CAMERA)
+    found = incidence(seen, [floor], LEVEL, CAMERA)
+    right = (np.arange(18) - CAMERA.cx)[None, :] / CAMERA.fx
+    up = (CAMERA.cy - np.arange(14))[:, None] / CAMERA.fy
+    below = np.isfinite(seen.depth_m)
+    np.testing.assert_allclose(found[below], np.arccos(-up / np.sqrt(1 + right**2 + up**2))[below], atol=1e-6)
+    assert (found[~below] == 0).all()
+
+
 def test_behind_glass_is_the_next_opaque_surface_with_its_own_number() -> None:
     boxes = [PANE, WALL]
     front, behind = render(boxes, LEVEL, CAMERA), render_behind_glass(boxes, LEVEL, CAMERA)
     pane = is_made_of("glass", front, boxes)
-    assert 0 < pane.sum() < pane.size
+    assert 0.2 < pane.mean() < 0.8
     assert (front.depth_m[pane] == np.float32(1.995)).all()
+    assert (front.part[pane] == Part.LEAF).all()
     assert (front.box == np.where(pane, 0, 1)).all()
     assert (behind.depth_m == 3).all()
+    assert (behind.part == Part.WALL).all()
     assert (behind.box == 1).all()
+    np.testing.assert_array_equal(front.depth_m[~pane], behind.depth_m[~pane])
     assert not is_made_of("glass", behind, boxes).any()
+
+
+def test_what_is_too_near_is_made_of_no_glass() -> None:
+    boxes = [PANE, WALL]
+    cut = cut_range(render(boxes, LEVEL, CAMERA), DepthCamera(min_depth_m=2.5))
+    assert is_made_of("glass", render(boxes, LEVEL, CAMERA), boxes).any()
+    assert ((cut.box == NO_BOX) == np.isnan(cut.depth_m)).all()
+    assert not is_made_of("glass", cut, boxes).any()
 
 
 def test_what_is_cut_belongs_to_no_box_and_is_made_of_nothing() -> None:
