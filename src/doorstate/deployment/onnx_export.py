@@ -25,7 +25,7 @@ from doorstate.errors import ConfigError, ExportError, MissingExtraError
 from doorstate.files import atomic_path
 from doorstate.jobs import Progress, no_progress
 from doorstate.networks.base import PointNetwork
-from doorstate.networks.heads import PARTS, STATE, answers
+from doorstate.networks.heads import STATE, answers
 from doorstate.simulation.generate import PRESETS, draw_pose, pose_indices, replay
 from doorstate.training.answers import Columns
 from doorstate.training.card import WeightsCard
@@ -85,8 +85,7 @@ class _Graph(nn.Module):
     def forward(self, points: Tensor) -> tuple[Tensor, ...]:
         # As clouds.preparation.normalize, to the last digit: what is just inside a ball must not be just outside.
         centroid = points.mean(1, keepdim=True, dtype=torch.float64).to(torch.float32)
-        said = answers(self.network, (points - centroid) / SCALE_M)
-        said.pop(PARTS, None)
+        said = answers(self.network, (points - centroid) / SCALE_M, parts=False)
         return ((said.pop(STATE) / self.temperature).softmax(1), *said.values())
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from doorstate.clouds.preparation import centroids
+from doorstate.dataset.targets import PARTS
 from doorstate.errors import CloudContentError, MissingExtraError, WeightsError
 from doorstate.training.answers import Columns, in_metres
 from doorstate.training.card import WeightsCard
@@ -89,7 +90,7 @@ class OnnxNetwork:
 
 def heads_told(card: WeightsCard) -> tuple[str, ...]:
     """Outputs of a file besides the probabilities: heads of whole clouds."""
-    return tuple(name for name in card.heads if name != "parts")
+    return tuple(name for name in card.heads if name != PARTS)
 
 
 def _threads_by_environment() -> int:

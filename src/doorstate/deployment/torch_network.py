@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from doorstate.clouds.preparation import centroids, normalize
 from doorstate.networks.base import PointNetwork
-from doorstate.networks.heads import PARTS, STATE, answers
+from doorstate.networks.heads import STATE, answers
 from doorstate.training.answers import Columns, in_metres
 from doorstate.types import Points
 
@@ -35,7 +35,6 @@ class TorchNetwork:
     ) -> tuple[NDArray[np.float32], Columns]:
         """As `probabilities`, and what further heads say, (B,) each; in the number type of the network's weights."""
         with torch.inference_mode():
-            said = answers(self.network, torch.from_numpy(normalize(points).astype(kind)))
+            said = answers(self.network, torch.from_numpy(normalize(points).astype(kind)), parts=False)
             calibrated: NDArray[np.float32] = (said.pop(STATE) / self.temperature).softmax(1).numpy()
-        said.pop(PARTS, None)
         return calibrated, in_metres({name: each.numpy() for name, each in said.items()}, centroids(points))

@@ -152,7 +152,11 @@ def give_heads(network: PointNetwork, names: Sequence[str], num_parts: int = len
 
 
 def answers(
-    network: PointNetwork, points: Tensor, neighbourhoods: Neighbourhoods | None = None
+    network: PointNetwork,
+    points: Tensor,
+    neighbourhoods: Neighbourhoods | None = None,
+    *,
+    parts: bool = True,
 ) -> dict[str, Tensor]:
     """Logits of the states (B, num_classes) under "state", of the parts (B, N, num_parts), and (B, answers) by head.
 
@@ -160,6 +164,7 @@ def answers(
         network: with heads or without.
         points: (B, N, 3) as in `PointNetwork.forward`.
         neighbourhoods: as there.
+        parts: of the points too, if the network has that head.
 
     Raises:
         CloudContentError: as there.
@@ -170,7 +175,7 @@ def answers(
     for name, head in network.heads.items():
         if isinstance(head, Head):
             found[name] = head.decode(head(encoding.features))
-        else:
+        elif parts:
             found[name] = at_least_float32(head(points, encoding))
     return found
 
