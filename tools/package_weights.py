@@ -13,8 +13,8 @@ import sys
 from pathlib import Path
 from statistics import median
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from results_page import NAMES
+from templates import template
 from zoo_page import PAGE, page
 
 from doorstate.evaluation.calibration import calibrate, reliability
@@ -37,12 +37,7 @@ def main(folder: str) -> None:
     """Package every network of a comparison with protocol `all`."""
     rows = RESULTS / "ogurob-4096"
     paper, by_pose = (load_results(RESULTS / name, rows) for name in ("paper", "by-pose"))
-    template = Environment(
-        loader=FileSystemLoader(Path(__file__).parent),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        keep_trailing_newline=True,
-    ).get_template("model_card.md.j2")
+    model_card = template("model_card.md.j2")
     for name in read_json(Path(folder) / "comparison.json")["networks"]:
         run = run_of(Path(folder), name, 0)
         network, card = load_weights(run.weights)
@@ -53,7 +48,7 @@ def main(folder: str) -> None:
         target = WEIGHTS / f"{name}.safetensors"
         save_weights(target, network, card.model_copy(update={"temperature": temperature}), half=True)
         metrics = run.read_metrics()
-        text = template.render(
+        text = model_card.render(
             name=name,
             title=NAMES[name],
             parameters=sum(p.numel() for p in network.parameters()),

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from templates import template
 
 from doorstate.evaluation.join import load_joined
 from doorstate.evaluation.metrics import Scores, scores
@@ -111,15 +111,8 @@ def write_pages(
         _render("related.md.j2", related_page, all=_published(both, rows_folder, reports_folder))
 
 
-def _render(template: str, page: Path, **content: Any) -> None:
-    environment = Environment(
-        loader=FileSystemLoader(Path(__file__).parent),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
-    text = environment.get_template(template).render(
+def _render(name: str, page: Path, **content: Any) -> None:
+    text = template(name).render(
         **content,
         names=NAMES,
         states=STATES,

@@ -10,8 +10,8 @@ import hashlib
 from pathlib import Path
 from typing import NamedTuple
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from results_page import NAMES
+from templates import template
 
 from doorstate.deployment.predictor import packaged_networks, packaged_weights
 from doorstate.files import write_text
@@ -47,14 +47,7 @@ def page() -> str:
         for name in (*list_networks(), "mvcnn")
     ]
     packaged = {name: _packaged(packaged_weights(name)) for name in packaged_networks()}
-    environment = Environment(
-        loader=FileSystemLoader(Path(__file__).parent),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
-    return environment.get_template("zoo.md.j2").render(networks=networks, packaged=packaged)
+    return template("zoo.md.j2").render(networks=networks, packaged=packaged)
 
 
 def _packaged(path: Path) -> Packaged:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import tempfile
-import threading
+import time
 import webbrowser
 from collections.abc import Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
@@ -216,8 +216,8 @@ def _show_live(predictor: Any, sightings: Iterable[Sighting], port: int, open_br
                 page.publish("cloud", look(predictor, sighting))
             page.publish("end", None)
             # Not for ever at once: where another thread is given Ctrl-C, this one learns of it when it wakes.
-            while not threading.Event().wait(0.5):
-                pass
+            while True:
+                time.sleep(0.5)
         except KeyboardInterrupt:
             err.print("stopped")
 

@@ -84,7 +84,7 @@ def prepare_dataset(
         rejected = read_csv(folder / REJECTED) if (folder / REJECTED).exists() else []
         return PreparationSummary(open_dataset(folder), rejected)
     run_pieces(_prepare_piece, pieces, paths, workers or default_workers(), progress)
-    simulated = is_simulated(source)
+    simulated = any(piece.simulated for piece in pieces)
     rows = [row for piece in pieces for row in piece.rows]
     rejected = _assemble(folder, rows, paths, num_points, simulated)
     name = read_settings(source).preset.name if simulated else source.resolve().name

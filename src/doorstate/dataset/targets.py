@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from doorstate.clouds.augment import AugmentationDraw
 from doorstate.clouds.preparation import SCALE_M
+from doorstate.simulation.manifest import numbers
 from doorstate.types import NO_DOOR, Part, Points
 
 Targets = dict[str, NDArray[np.float32]]
@@ -31,14 +32,14 @@ def door_targets(rows: Sequence[Mapping[str, str]], centroids: Points) -> Target
 
     A frame's yaw is that of its outward normal, which points to the robot's side of the wall.
     """
-    angle = np.radians(_column(rows, "opening_angle_deg"))
+    angle = np.radians(numbers(rows, "opening_angle_deg"))
     hinge = [_HINGE.get(row.get("hinge") or row.get("door.hinge", ""), math.nan) for row in rows]
-    normal = np.radians(_column(rows, "door_yaw_deg") + 90)
-    place = np.stack([_column(rows, name) for name in ("door_x_m", "door_y_m")], axis=1) - centroids[:, :2]
+    normal = np.radians(numbers(rows, "door_yaw_deg") + 90)
+    place = np.stack([numbers(rows, name) for name in ("door_x_m", "door_y_m")], axis=1) - centroids[:, :2]
     widths = np.stack(
         [
-            _column(rows, "opening_width_m", "door.opening_width_m"),
-            _column(rows, "passable_width_m"),
+            numbers(rows, "opening_width_m", "door.opening_width_m"),
+            numbers(rows, "passable_width_m"),
         ],
         axis=1,
     )
@@ -78,8 +79,3 @@ def augmented(targets: Targets, draw: AugmentationDraw | None) -> Targets:
         yaw = np.arctan2(normal[:, 1], normal[:, 0])
         changed["frame"] = np.column_stack([place + draw.shift[:, 0, :2], yaw])
     return {name: values.astype(np.float32) for name, values in changed.items()}
-
-
-def _column(rows: Sequence[Mapping[str, str]], *names: str) -> NDArray[np.float64]:
-    """(M,) numbers under the first of the names that a row has, NaN where it has none."""
-    return np.array([float(next((row[name] for name in names if row.get(name)), math.nan)) for row in rows])

@@ -11,7 +11,9 @@ from sklearn.metrics import roc_auc_score
 from doorstate.dataset.store import PreparedDataset
 from doorstate.evaluation.metrics import Floats, ratio
 from doorstate.evaluation.results import Answers, ComparisonResults
+from doorstate.evaluation.stratum_tables import rows_of
 from doorstate.evaluation.table import Table, number
+from doorstate.simulation.manifest import numbers
 from doorstate.types import NO_DOOR, Part
 
 _SURE = 0.5  # from here on a probability is a yes
@@ -53,7 +55,7 @@ def presence_table(results: ComparisonResults, dataset: PreparedDataset) -> Tabl
         given = results.answers(method)
         if given is None or "p_door" not in given.columns:
             continue
-        manifest = [dataset.rows[dataset.index_of(sample_id)] for sample_id in given.sample_ids]
+        manifest = rows_of(dataset, given)
         kinds = np.array([row.get("door_kind") or row.get("scene_kind", "") for row in manifest])
         doors = np.array([row["state"] != NO_DOOR for row in manifest])
         said = given.columns["p_door"] >= _SURE
@@ -90,13 +92,10 @@ def parts_table(results: ComparisonResults) -> Table:
 
 def _errors(given: Answers, dataset: PreparedDataset) -> list[tuple[float, int]]:
     """Figures of a row of `answers_table`, each with its digits."""
-    manifest = [dataset.rows[dataset.index_of(sample_id)] for sample_id in given.sample_ids]
-
-    def truth(*names: str) -> Floats:
-        return np.array([float(next((row[n] for n in names if row.get(n)), math.nan)) for row in manifest])
+    manifest = rows_of(dataset, given)
 
     def off(name: str, *others: str) -> Floats:
-        return np.abs(given.columns.get(name, math.nan) - truth(name, *others))
+        return np.abs(given.columns.get(name, math.nan) - numbers(manifest, name, *others))
 
     state = np.array([row["state"] for row in manifest])
     angle = off("opening_angle_deg")
@@ -104,7 +103,9 @@ def _errors(given: Answers, dataset: PreparedDataset) -> list[tuple[float, int]]
     said_left = given.columns.get("p_hinge_left", np.full(len(state), math.nan))
     hinge_right = (said_left >= _SURE) == (hinge == "left")
     place = np.hypot(off("door_x_m"), off("door_y_m"))
-    turn = np.abs((given.columns.get("door_yaw_deg", math.nan) - truth("door_yaw_deg") + 180) % 360 - 180)
+    turn = np.abs(
+        (given.columns.get("door_yaw_deg", math.nan) - numbers(manifest, "door_yaw_deg") + 180) % 360 - 180
+    )
     return [
         (_auroc(given, state), 4),
         (_mean(angle[state == "semi_open"]), 1),
@@ -126,12 +127,12 @@ def _auroc(given: Answers, state: np.ndarray) -> float:
 
 
 def _mean(values: Floats) -> float:
-    return _quantile(values, None)
-
-
-def _quantile(values: Floats, share: float | None) -> float:
-    """A quantile of what is known, or its mean."""
+    """Of what is known."""
     known = values[~np.isnan(values)]
-    if len(known) == 0:
-        return math.nan
-    return float(known.mean() if share is None else np.quantile(known, share))
+    return float(known.mean()) if len(known) else math.nan
+
+
+def _quantile(values: Floats, share: float) -> float:
+    """Of what is known."""
+    known = values[~np.isnan(values)]
+    return float(np.quantile(known, share)) if len(known) else math.nan

@@ -13,6 +13,7 @@ from doorstate.evaluation.metrics import Floats
 from doorstate.evaluation.results import ComparisonResults
 from doorstate.evaluation.stratum_tables import rows_of
 from doorstate.evaluation.table import Table, number
+from doorstate.simulation.manifest import numbers
 from doorstate.types import STATES
 
 _CLOSED = STATES.index("closed")
@@ -26,7 +27,7 @@ def angle_table(results: ComparisonResults, dataset: PreparedDataset) -> Table:
         if np.isnan(predictions.angles_deg).all():
             continue
         manifest = rows_of(dataset, predictions)
-        truth = np.array([float(row.get("opening_angle_deg") or "nan") for row in manifest])
+        truth = numbers(manifest, "opening_angle_deg")
         region = np.array([row.get("region", "") for row in manifest])
         asked = (predictions.true != _CLOSED) & ~np.isnan(truth)
         error = np.abs(predictions.angles_deg - truth)

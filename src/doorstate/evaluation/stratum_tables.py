@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from doorstate.dataset.store import PreparedDataset
 from doorstate.dataset.strata import BANDS, REGIONS
 from doorstate.evaluation.metrics import accuracy, confusion_matrix, ratio, scores
-from doorstate.evaluation.results import ComparisonResults, Predictions
+from doorstate.evaluation.results import Answers, ComparisonResults, Predictions
 from doorstate.evaluation.table import UNDEFINED, Table, number
 from doorstate.types import ANSWERS, NO_DOOR, STATES, Indices
 
@@ -35,9 +35,9 @@ def _stratum(row: Mapping[str, str]) -> tuple[int, int] | None:
     return list(REGIONS).index(region), BANDS.index(band)
 
 
-def rows_of(dataset: PreparedDataset, predictions: Predictions) -> list[dict[str, str]]:
-    """Find the manifest row of each of the N predictions."""
-    return [dataset.rows[dataset.index_of(sample_id)] for sample_id in predictions.sample_ids]
+def rows_of(dataset: PreparedDataset, said: Predictions | Answers) -> list[dict[str, str]]:
+    """Find the manifest row of each of N predictions or answers."""
+    return [dataset.rows[dataset.index_of(sample_id)] for sample_id in said.sample_ids]
 
 
 def is_undecidable(row: Mapping[str, str]) -> bool:

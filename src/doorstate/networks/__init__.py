@@ -30,6 +30,20 @@ def list_networks() -> list[str]:
     return list(NETWORKS)
 
 
+def network_class(name: str) -> type[PointNetwork]:
+    """What `create_network` builds.
+
+    Raises:
+        ConfigError: Unknown name.
+    """
+    known = NETWORKS | MULTI_VIEW
+    if name not in known:
+        close = get_close_matches(name, known, n=1)
+        hint = f"did you mean {close[0]!r}?" if close else f"known are {', '.join(known)}"
+        raise ConfigError(f"there is no network {name!r}: {hint}")
+    return known[name]
+
+
 def create_network(name: str, num_classes: int = 3, **options: Any) -> PointNetwork:
     """Build an untrained network.
 
@@ -41,12 +55,7 @@ def create_network(name: str, num_classes: int = 3, **options: Any) -> PointNetw
     Raises:
         ConfigError: Unknown name or option.
     """
-    known_networks = NETWORKS | MULTI_VIEW
-    if name not in known_networks:
-        close = get_close_matches(name, known_networks, n=1)
-        hint = f"did you mean {close[0]!r}?" if close else f"known are {', '.join(known_networks)}"
-        raise ConfigError(f"there is no network {name!r}: {hint}")
-    network = known_networks[name]
+    network = network_class(name)
     known = network.__init__.__kwdefaults__ or {}
     for option in options:
         if option not in known:

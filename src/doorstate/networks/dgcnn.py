@@ -10,7 +10,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from doorstate.networks.base import Encoding, Neighbourhoods, PointNetwork
-from doorstate.networks.layers import Dense, JoinedDense, RowBatchNorm, glorot, set_batchnorm
+from doorstate.networks.layers import PointHead, RowBatchNorm, set_batchnorm
 from doorstate.networks.ops import full_precision, gather_rows, max_over_points, neighbour_max, neighbour_sum
 from doorstate.networks.search import knn, spatial_order
 
@@ -72,13 +72,12 @@ class PartBranch(nn.Module):
 
     def __init__(self, num_parts: int) -> None:
         super().__init__()
-        self.joined = JoinedDense(512, 2048, 256)
-        self.rest = nn.Sequential(Dense(256, 128), glorot(nn.Linear(128, num_parts)))
+        self.head = PointHead(512, 2048, num_parts)
 
     def forward(self, points: Tensor, encoding: Encoding) -> Tensor:
         """(B, N, num_parts) logits in the order of the points."""
         order, edges = encoding.inner
-        logits: Tensor = self.rest(self.joined(edges, encoding.features))
+        logits: Tensor = self.head(edges, encoding.features)
         return gather_rows(logits, order.argsort(dim=1))
 
 

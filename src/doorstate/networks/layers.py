@@ -163,6 +163,20 @@ class JoinedDense(nn.Module):
         return out.relu_()
 
 
+class PointHead(nn.Module):
+    """Logits of every point from its own features beside its cloud's."""
+
+    def __init__(self, num_features: int, cloud_features: int, num_classes: int) -> None:
+        super().__init__()
+        self.joined = JoinedDense(num_features, cloud_features, 256)
+        self.rest = nn.Sequential(Dense(256, 128), glorot(nn.Linear(128, num_classes)))
+
+    def forward(self, rows: Tensor, features: Tensor) -> Tensor:
+        """(B, N, num_classes) of (B, N, C) rows and (B, F) features of their clouds."""
+        logits: Tensor = self.rest(self.joined(rows, features))
+        return logits
+
+
 class PointLinear(nn.Linear):
     """Linear layer on [coordinates; features], whose coordinate part ignores autocast.
 

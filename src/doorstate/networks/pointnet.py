@@ -10,10 +10,9 @@ from doorstate.networks.base import Encoding, Neighbourhoods, PointNetwork
 from doorstate.networks.layers import (
     Dense,
     DenseMax,
-    JoinedDense,
+    PointHead,
     PointMLP,
     classification_head,
-    glorot,
     set_batchnorm,
 )
 from doorstate.networks.ops import at_least_float32, full_precision
@@ -46,12 +45,11 @@ class PartBranch(nn.Module):
 
     def __init__(self, num_parts: int) -> None:
         super().__init__()
-        self.joined = JoinedDense(64, 1024, 256)
-        self.rest = nn.Sequential(Dense(256, 128), glorot(nn.Linear(128, num_parts)))
+        self.head = PointHead(64, 1024, num_parts)
 
     def forward(self, points: Tensor, encoding: Encoding) -> Tensor:
         """(B, N, num_parts) logits."""
-        logits: Tensor = self.rest(self.joined(encoding.inner[1], encoding.features))
+        logits: Tensor = self.head(encoding.inner[1], encoding.features)
         return logits
 
 

@@ -5,10 +5,13 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from doorstate.errors import DatasetError
@@ -54,6 +57,11 @@ def unflatten(columns: Mapping[str, str]) -> Row:
         raise DatasetError(
             f"manifest line {columns.get('sample_id', '?')}, column {column}: {problem['msg']}"
         ) from error
+
+
+def numbers(rows: Sequence[Mapping[str, str]], *names: str) -> NDArray[np.float64]:
+    """(M,) numbers under the first of the names that a row has, NaN where it has none."""
+    return np.array([float(next((row[name] for name in names if row.get(name)), math.nan)) for row in rows])
 
 
 def write_csv(path: Path, rows: Sequence[Mapping[str, str]]) -> None:

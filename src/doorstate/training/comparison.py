@@ -15,7 +15,7 @@ from doorstate.dataset.splits import EVERYTHING, NUM_FOLDS, PROTOCOLS, draw_spli
 from doorstate.dataset.store import PreparedDataset, open_dataset
 from doorstate.errors import ConfigError, RunError
 from doorstate.jobs import Progress, default_workers, no_progress, run_pieces
-from doorstate.networks import create_network, list_networks
+from doorstate.networks import create_network, list_networks, network_class
 from doorstate.networks.heads import PARTS, give_heads
 from doorstate.rules import create_rule
 from doorstate.training.fit import RunConfig, fit, threads
@@ -59,7 +59,7 @@ class Experiment(BaseModel):
 
     def heads_of(self, network: str) -> tuple[str, ...]:
         """The heads of a network: all, but "parts" only where it has features of single points."""
-        able = create_network(network).has_point_features
+        able = network_class(network).has_point_features
         return tuple(name for name in self.heads if able or name != PARTS)
 
     @property
