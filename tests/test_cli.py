@@ -31,6 +31,7 @@ COMMANDS = (
     "compare",
     "report",
     "resolution",
+    "transfer",
     "predict",
     "evaluate",
     "view",
@@ -300,6 +301,36 @@ def test_resolution_goes_on_from_a_comparison(run: Run, simulated_folder: Path, 
     before = (tmp_path / "out" / "latency.csv").read_bytes()
     assert run("resolution", study, "--out", tmp_path / "out")[0] == 0
     assert (tmp_path / "out" / "latency.csv").read_bytes() == before, "nothing is measured twice"
+
+
+def test_transfer_tests_what_was_trained_elsewhere(
+    run: Run, small_dataset: PreparedDataset, tmp_path: Path
+) -> None:
+    runs, study, out_folder = tmp_path / "runs", tmp_path / "study.toml", tmp_path / "out"
+    code, _, err = run(
+        *("compare", "--data", small_dataset.folder, "--out", runs, "--networks", "pointnet", "--folds", 1),
+        *("--points", 128, "--epochs", 1, "--set", "batch_size=8", "--set", "precision=fp32"),
+    )
+    assert code == 0, err
+    study.write_text(
+        f'networks = ["pointnet"]\nnum_points = 128\n[trained]\nhere = "{runs}"\n'
+        f'[tested]\nthere = "{small_dataset.folder}"\n'
+    )
+    code, out, err = run("transfer", study, "--out", out_folder)
+    assert code == 0, err
+    assert any("here" in line and "pointnet" in line for line in out.splitlines())
+    assert (out_folder / "report" / "figures" / "transfer.png").is_file()
+    assert run("report", out_folder / "here" / "there")[0] == 0
+
+
+def test_train_on_everything_tests_nothing(run: Run, small_dataset: PreparedDataset, tmp_path: Path) -> None:
+    code, out, err = run(
+        *("train", "pointnet", "--data", small_dataset.folder, "--protocol", "all", "--points", 128),
+        *("--epochs", 1, "--set", "batch_size=8", "--set", "precision=fp32", "--out", tmp_path / "run"),
+    )
+    assert code == 0, err
+    assert "trained on all 36 clouds" in out
+    assert (tmp_path / "run" / "weights.safetensors").is_file()
 
 
 def test_train_makes_one_run(run: Run, small_dataset: PreparedDataset, tmp_path: Path) -> None:

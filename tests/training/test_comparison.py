@@ -77,6 +77,8 @@ def test_a_network_may_differ_and_options_win_over_that_too(tmp_path: Path) -> N
         ('dataset = "d"\n[network_changes.pointnett]\nepochs = 3', "no network 'pointnett'"),
         ('dataset = "d"\n[network_changes.dgcnn]\nepoch = 3', "recipe_changes: epoch: Extra inputs"),
         ('dataset = "d"\nprotocol = "all"', "protocol all has one fold: set folds = 1"),
+        ('dataset = "d"\nprotocol = "unseen"', "protocol unseen has one fold: set folds = 1"),
+        ('dataset = "d"\nprotocol = "unseen"\nfolds = 1', "protocol unseen trains nothing"),
         ('dataset = "d"\nfolds = 6', "folds: Input should be less than or equal to 5"),
     ],
 )

@@ -18,6 +18,7 @@ from doorstate.cli.export import export
 from doorstate.cli.resolution import resolution
 from doorstate.cli.service import serve
 from doorstate.cli.training import compare, report, train
+from doorstate.cli.transfer import transfer
 from doorstate.cli.viewing import view
 from doorstate.cli.worlds import export_sdf
 from doorstate.errors import DoorstateError
@@ -39,6 +40,7 @@ for command in (
     compare,
     report,
     resolution,
+    transfer,
     predict,
     evaluate,
     view,

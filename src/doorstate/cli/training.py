@@ -48,6 +48,7 @@ def train(
         "name": out.name,
         "dataset": str(data),
         "protocol": protocol,
+        "folds": 1,
         "networks": (network,),
         "num_points": points,
         "seed": seed,

@@ -12,6 +12,8 @@ are used by nobody in that fold.
 show and from where.
 
 `all`: one "fold" that trains on every sample and tests none, for weights to be used once a recipe has been chosen.
+
+`unseen`: one "fold" that tests every sample and trains on none, for weights that were trained on something else.
 """
 
 from __future__ import annotations
@@ -30,8 +32,9 @@ from doorstate.simulation.manifest import read_csv, write_csv
 
 Role = Literal["train", "val", "test", "unused"]
 Row = Mapping[str, str]
-EVERYTHING = "all"
-PROTOCOLS = ("paper", "by-pose", "by-scene", EVERYTHING)
+EVERYTHING, UNSEEN = "all", "unseen"
+ONE_FOLD: Mapping[str, Role] = {EVERYTHING: "train", UNSEEN: "test"}
+PROTOCOLS = ("paper", "by-pose", "by-scene", *ONE_FOLD)
 NUM_FOLDS = 5
 EMBARGO_M = 0.5
 _TENTHS = 10
@@ -53,8 +56,8 @@ def draw_splits(rows: Sequence[Row], protocol: str, seed: int) -> list[dict[str,
         )
     if protocol not in PROTOCOLS:
         raise ConfigError(f"no protocol {protocol!r}: choose one of {', '.join(PROTOCOLS)}")
-    if protocol == EVERYTHING:
-        return [dict.fromkeys((row["sample_id"] for row in rows), "train")]
+    if protocol in ONE_FOLD:
+        return [dict.fromkeys((row["sample_id"] for row in rows), ONE_FOLD[protocol])]
     splits = {"paper": _paper, "by-pose": _by_pose, "by-scene": _by_scene}[protocol](rows, seed)
     for fold, roles in enumerate(splits):
         for role in ("train", "val", "test"):

@@ -34,6 +34,7 @@ PROTOCOLS = {
         "never trained on."
     ),
     "all": "Everything was trained on and nothing tested.",
+    "unseen": "Weights were trained on other data; what is tested here shares no scene and no sample with that.",
 }
 
 

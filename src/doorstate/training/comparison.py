@@ -11,7 +11,15 @@ from typing import Any, NamedTuple
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from doorstate.clouds.preparation import NUM_POINTS
-from doorstate.dataset.splits import EVERYTHING, NUM_FOLDS, PROTOCOLS, draw_splits, read_splits, write_splits
+from doorstate.dataset.splits import (
+    NUM_FOLDS,
+    ONE_FOLD,
+    PROTOCOLS,
+    UNSEEN,
+    draw_splits,
+    read_splits,
+    write_splits,
+)
 from doorstate.dataset.store import PreparedDataset, open_dataset
 from doorstate.errors import ConfigError, RunError
 from doorstate.jobs import Progress, default_workers, no_progress, run_pieces
@@ -71,13 +79,16 @@ class Experiment(BaseModel):
         """Raise ConfigError for a name that does not exist, before anything is trained."""
         if self.protocol not in PROTOCOLS:
             raise ConfigError(f"no protocol {self.protocol!r}: choose one of {', '.join(PROTOCOLS)}")
-        if self.protocol == EVERYTHING and self.folds != 1:
-            raise ConfigError(f"experiment {self.name}: protocol {EVERYTHING} has one fold: set folds = 1")
+        if self.protocol in ONE_FOLD and self.folds != 1:
+            raise ConfigError(f"experiment {self.name}: protocol {self.protocol} has one fold: set folds = 1")
         if unknown := sorted(set(self.network_changes) - set(list_networks())):
             raise ConfigError(f"experiment {self.name}: network_changes: no network {unknown[0]!r}")
         for network in self.networks:
             give_heads(create_network(network), self.heads_of(network))
-            self.recipe_of(network)
+            if self.recipe_of(network).epochs and self.protocol == UNSEEN:
+                raise ConfigError(
+                    f"experiment {self.name}: protocol {UNSEEN} trains nothing: set recipe_changes.epochs = 0"
+                )
         for rule in self.rules:
             create_rule(rule)
 

@@ -43,6 +43,7 @@ from doorstate.training.run_folder import RunFolder, write_predictions
 from doorstate.training.weights import load_into, read_card, save_weights
 from doorstate.types import NO_DOOR, STATES, Part
 
+_ROLES: tuple[Role, ...] = ("train", "val", "test")
 _EVALUATION_BATCH = 32
 _TELL_EVERY_S = 1.0
 _SAVE_EVERY_S = 180.0  # within an epoch, which can take a quarter of an hour
@@ -403,8 +404,8 @@ def _samples(roles: Mapping[str, Role], dataset: PreparedDataset) -> dict[str, l
     samples: dict[str, list[str]] = {"train": [], "val": [], "test": [], "unused": []}
     for sample, role in roles.items():
         samples[role].append(sample)
-    everything = not samples["val"] and not samples["test"]
-    needed: tuple[Role, ...] = ("train",) if everything else ("train", "val", "test")
+    given = [role for role in _ROLES if samples[role]]
+    needed = given if given in (["train"], ["test"]) else _ROLES
     for role in needed:
         if len(samples[role]) < 2:
             raise DatasetError(

@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a training is worth elsewhere: weights of some comparisons tested on data sets that none of them has seen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from doorstate.clouds.preparation import NUM_POINTS
+from doorstate.dataset.splits import UNSEEN, Role, read_splits, write_splits
+from doorstate.dataset.store import open_dataset
+from doorstate.errors import ConfigError, RunError
+from doorstate.networks import list_networks
+from doorstate.training.comparison import Experiment, first_problem, read_toml
+from doorstate.training.run_folder import read_json
+
+_Name = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9-]*$")]
+
+
+class Cell(NamedTuple):
+    """Weights of one comparison on one data set."""
+
+    trained: str
+    tested: str
+    experiment: Experiment
+
+    @property
+    def folder(self) -> Path:
+        """Of its comparison, within the study's."""
+        return Path(self.trained, self.tested)
+
+
+class TransferStudy(BaseModel):
+    """One flat study file: finished comparisons by name, whose fold 0 is tested, and data sets by name."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    name: str
+    trained: dict[_Name, str] = Field(min_length=1)
+    tested: dict[_Name, str] = Field(min_length=1)
+    networks: tuple[str, ...] = Field(default_factory=lambda: tuple(list_networks()))
+    num_points: int = Field(default=NUM_POINTS, ge=128)
+
+    def cells(self) -> Iterator[Cell]:
+        """Every pair of a comparison and a data set.
+
+        Raises:
+            RunError: a comparison is not there.
+        """
+        for trained, comparison in self.trained.items():
+            heads = _comparison(comparison).get("heads", ())
+            for tested, dataset in self.tested.items():
+                experiment = Experiment(
+                    name=f"{self.name}: {trained} on {tested}",
+                    dataset=dataset,
+                    protocol=UNSEEN,
+                    networks=self.networks,
+                    folds=1,
+                    num_points=self.num_points,
+                    recipe_changes={"epochs": 0},
+                    start_from=comparison,
+                    heads=heads,
+                )
+                experiment.check()
+                yield Cell(trained, tested, experiment)
+
+    def write_splits(self, folder: Path) -> None:
+        """Choose what each cell tests: the same samples of a data set for all weights, none of which any has seen.
+
+        Raises:
+            ConfigError: nothing of a data set is unseen.
+            RunError: a comparison is not there, or the folder holds a study of other samples.
+        """
+        known = set[str]().union(*(_seen(comparison) for comparison in self.trained.values()))
+        for tested, dataset in self.tested.items():
+            roles: dict[str, Role] = {
+                row["sample_id"]: "unused" if _origin(row) in known else "test"
+                for row in open_dataset(Path(dataset)).rows
+            }
+            if "test" not in roles.values():
+                raise ConfigError(f"{dataset}: every sample was trained on; simulate with another seed")
+            for trained in self.trained:
+                path = folder / trained / tested / "splits.csv"
+                if not path.is_file():
+                    write_splits(path, [roles])
+                elif read_splits(path) != [roles]:
+                    raise RunError(f"{path}: tests other samples; choose another folder")
+
+
+def load_transfer(path: Path) -> TransferStudy:
+    """Read a study file.
+
+    Raises:
+        ConfigError: missing, no TOML, or an unknown or wrong value.
+    """
+    try:
+        return TransferStudy.model_validate({"name": path.stem} | read_toml(path, "a study"))
+    except ValidationError as error:
+        raise ConfigError(f"{path}: {first_problem(error)}") from error
+
+
+def _seen(comparison: str) -> set[str]:
+    """Origins of the samples that fold 0 of a comparison was trained or validated on."""
+    roles = read_splits(Path(comparison) / "splits.csv")[0]
+    rows = open_dataset(Path(_comparison(comparison)["dataset"])).rows
+    return {_origin(row) for row in rows if roles[row["sample_id"]] in ("train", "val")}
+
+
+def _origin(row: Mapping[str, str]) -> str:
+    """What two samples may not share: the scene, whatever sensor it was seen with; without scenes the sample."""
+    return row.get("scene_id") or row["sample_id"]
+
+
+def _comparison(folder: str) -> dict[str, Any]:
+    path = Path(folder) / "comparison.json"
+    if not path.is_file():
+        raise RunError(f"{path}: no such comparison; run it first")
+    return read_json(path)
