@@ -16,9 +16,9 @@ from doorstate.dataset.splits import Role
 from doorstate.dataset.store import PreparedDataset
 from doorstate.evaluation.figures import encode_figures, save_drawings
 from doorstate.evaluation.table import Table, number
+from doorstate.files import read_csv
 from doorstate.networks import create_network
 from doorstate.networks.base import Neighbourhoods, PointNetwork
-from doorstate.simulation.manifest import read_csv
 from doorstate.training import fit as training
 from doorstate.training.fit import RunConfig, fit
 from doorstate.training.run_folder import RunFolder
@@ -48,13 +48,9 @@ def train_both(
 
 
 def _build_plain(config: RunConfig) -> PointNetwork:
-    """The network with the same parameters and the same names, computed in the plain way."""
+    """The network with the same parameters and names, trained in the plain way and tested in the fast one."""
     network = create_network(config.network, **training._network_options(config))
     plain: Any = plain_form(network)
-
-    def forward(points: Tensor, neighbourhoods: Neighbourhoods | None = None) -> Tensor:
-        logits: Tensor = plain(points)
-        return logits
 
     def training_loss(
         points: Tensor,
@@ -66,7 +62,7 @@ def _build_plain(config: RunConfig) -> PointNetwork:
         return result
 
     # On the instance, past nn.Module's own bookkeeping: weights are saved and loaded under the network's names.
-    network.__dict__.update(forward=forward, training_loss=training_loss)
+    network.__dict__.update(training_loss=training_loss)
     return network
 
 

@@ -21,14 +21,14 @@ def measure(dataset: PreparedDataset, network: str, count: int, fold: int, progr
     rows = []
     for _, row, frame in tested_frames(dataset, count, fold, progress):
         answers = {name: predict(frame.points) for name, predict in samplings.items()}
-        rows.append({"sample_id": row["sample_id"]} | {k: _told(v) for k, v in answers.items()})
+        rows.append({"truth": row["state"]} | {k: _told(v) for k, v in answers.items()})
     return rows
 
 
 def thinning_table(rows: Sequence[Group]) -> Table:
     """One line: how many answers agree, how many of each are right, how far probabilities are apart."""
     some, every = ([row[name] for row in rows] for name in ("some", "all"))
-    truth = [row["sample_id"].rsplit("-", 1)[-1] for row in rows]
+    truth = [row["truth"] for row in rows]
     agree = sum(a["state"] == b["state"] for a, b in zip(some, every, strict=True))
     right = [sum(a["state"] == t for a, t in zip(answers, truth, strict=True)) for answers in (some, every)]
     apart = [

@@ -100,6 +100,20 @@ def test_predict_prints_a_table(run: Run, weights: Path, cloud: np.ndarray, tmp_
     assert err == ""
 
 
+def test_names_of_files_are_printed_as_they_are(
+    run: Run, weights: Path, cloud: np.ndarray, tmp_path: Path
+) -> None:
+    for name in ("rec[red]x.npy", ":door:.npy"):
+        np.save(tmp_path / name, cloud)
+    (tmp_path / "bad[" / "b]").mkdir(parents=True)
+    (tmp_path / "bad[" / "b].npy").write_bytes(b"nothing")
+    code, out, err = run("predict", tmp_path, "--weights", weights)
+    assert code == 1
+    assert "rec[red]x.npy" in out
+    assert ":door:.npy" in out
+    assert "bad[/b].npy" in err
+
+
 def test_predict_by_a_rule_needs_no_weights_and_may_say_why_not(
     run: Run, simulated_folder: Path, tmp_path: Path
 ) -> None:
@@ -113,7 +127,7 @@ def test_predict_by_a_rule_needs_no_weights_and_may_say_why_not(
     assert "none: " in out, "this rule tells open doors only, from images only"
     code, _, err = run("predict", "--rule", "open_door", "--points", 128, cloud)
     assert code == 1
-    assert "leave --weights and --points out" in err
+    assert "leave weights, points and time budget out" in err
     assert run("predict", "--rule", "nonsense", cloud)[0] == 1
 
 

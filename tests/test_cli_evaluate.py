@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from doorstate.files import write_csv
 from doorstate.simulation.generate import draw_pose, find_preset, replay
-from doorstate.simulation.manifest import write_csv
 from doorstate.types import NO_ANSWER
 from headless_chromium import Browser
 

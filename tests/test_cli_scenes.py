@@ -7,7 +7,7 @@ import xml.etree.ElementTree as ET
 from collections.abc import Callable
 from pathlib import Path
 
-from doorstate.simulation.manifest import read_csv
+from doorstate.files import read_csv
 
 Run = Callable[..., tuple[int, str, str]]
 

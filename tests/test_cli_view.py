@@ -185,7 +185,7 @@ def test_a_bag_is_shown_live_to_its_end(view: Run, tmp_path: Path) -> None:
         (("FOLDER", "FOLDER", "--live"), "--live takes one folder", 1),
         (("FOLDER/a.npy", "--live"), "--live takes one folder", 1),
         (("FOLDER", "--live", "--out", "page.html"), "leave --out out", 1),
-        (("FOLDER", "--rule", "plane_state"), "leave --weights and --points out", 1),
+        (("FOLDER", "--rule", "plane_state"), "leave weights, points and time budget out", 1),
         (("FOLDER", "--frame", "sideways"), "sideways", 1),
     ],
 )

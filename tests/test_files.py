@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files appear whole or not at all."""
+"""Files appear whole or not at all, and tables come back as they were written."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from doorstate.files import atomic_path, is_vacant, write_text
+from doorstate.errors import DatasetError
+from doorstate.files import atomic_path, is_vacant, read_csv, write_csv, write_text
 
 
 def test_the_target_appears_when_the_block_ends(tmp_path: Path) -> None:
@@ -59,3 +60,26 @@ def test_a_folder_is_vacant_until_something_whole_is_in_it(tmp_path: Path) -> No
     (tmp_path / "notes.txt").touch()
     assert not is_vacant(tmp_path)
     assert not is_vacant(tmp_path / "notes.txt")
+
+
+def test_rows_of_different_columns_share_one_header(tmp_path: Path) -> None:
+    write_csv(tmp_path / "a.csv", [{"a": "1"}, {"b": 'two, "2"', "a": "line\nbreak"}])
+    assert read_csv(tmp_path / "a.csv") == [{"a": "1", "b": ""}, {"a": "line\nbreak", "b": 'two, "2"'}]
+
+
+@pytest.mark.parametrize(
+    "content",
+    [None, b"a,b\n1\n", b"a,b\n1,2,3\n", b"a,b\n\xff\xfe,2\n", b'a,b\n"1"2,3\n'],
+    ids=["missing", "short", "long", "not UTF-8", "stray quote"],
+)
+def test_a_file_that_is_no_such_table_is_refused_by_name(tmp_path: Path, content: bytes | None) -> None:
+    path = tmp_path / "manifest.csv"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(DatasetError, match=r"manifest\.csv: "):
+        read_csv(path)
+
+
+def test_a_table_saved_by_a_spreadsheet_has_the_same_columns(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("file,state\na.pcd,open\n", encoding="utf-8-sig")
+    assert read_csv(tmp_path / "a.csv") == [{"file": "a.pcd", "state": "open"}]

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
@@ -11,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from doorstate.errors import ConfigError
+from doorstate.errors import ConfigError, RunError
 from doorstate.files import write_text
 from doorstate.jobs import Shard, default_workers, piece_paths, run_pieces
 
@@ -44,6 +45,10 @@ def square_of_positive(piece: int, path: Path) -> None:
     square(piece, path)
 
 
+def killed(piece: int, path: Path) -> None:
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
 @pytest.mark.parametrize("workers", [1, 2])
 def test_runs_what_is_missing_and_counts_all(tmp_path: Path, workers: int) -> None:
     paths = piece_paths(tmp_path, 5, ".txt")
@@ -73,6 +78,11 @@ def test_an_error_leaves_out_what_has_not_begun(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="negative"):
         run_pieces(square_of_positive, [1, -2, 3], paths, 1)
     assert [path.exists() for path in paths] == [True, False, False]
+
+
+def test_a_killed_worker_is_one_line(tmp_path: Path) -> None:
+    with pytest.raises(RunError, match="go on with fewer at a time"):
+        run_pieces(killed, [0, 1], piece_paths(tmp_path, 2, ".txt"), 2)
 
 
 def test_pieces_and_paths_must_belong_together(tmp_path: Path) -> None:

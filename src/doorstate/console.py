@@ -6,7 +6,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.live import Live
@@ -19,30 +19,30 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 from rich.table import Table
+from rich.text import Text
 
 if TYPE_CHECKING:
     from doorstate.training.comparison import Run
     from doorstate.training.recipes import Recipe
 
-out = Console(highlight=False)
-err = Console(stderr=True, highlight=False)
-
-
-def _columns() -> tuple[TextColumn, BarColumn, MofNCompleteColumn, TimeElapsedColumn, TimeRemainingColumn]:
-    return (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(compact=True),
-    )
+# Names of files are printed as they are: brackets and colons in them mean nothing.
+_PLAIN: dict[str, Any] = {"highlight": False, "markup": False, "emoji": False}
+out = Console(**_PLAIN)
+err = Console(stderr=True, **_PLAIN)
 
 
 @contextmanager
 def progress_bar(description: str) -> Iterator[Callable[[int, int], None]]:
     """A bar on standard error; yields `update(done, total)`. Where nobody looks it prints nothing."""
     with Progress(
-        *_columns(), console=err, transient=not err.is_terminal, disable=not err.is_terminal
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(compact=True),
+        console=err,
+        transient=not err.is_terminal,
+        disable=not err.is_terminal,
     ) as progress:
         task = progress.add_task(description, total=None)
 
@@ -60,7 +60,7 @@ def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]
     for row in rows:
         table.add_row(*row)
     # Piped output is not folded to a terminal that is not there.
-    Console(highlight=False, width=None if sys.stdout.isatty() else 160).print(table)
+    Console(**_PLAIN, width=None if sys.stdout.isatty() else 160).print(table)
 
 
 @contextmanager
@@ -109,13 +109,13 @@ class _RunWatch:
         seconds = seconds_left(self._runs, self._recipes, self._num_points)
         return f", about {seconds / self._jobs / 60:.0f} min left" if seconds else ""
 
-    def _cell(self, run: Run) -> str:
+    def _cell(self, run: Run) -> Text:
         if run.folder.finished:
             score = run.folder.read_metrics().get("test_macro_f1")
-            return "[green]done[/green]" if score is None else f"[green]{score:.4f}[/green]"
+            return Text("done" if score is None else f"{score:.4f}", "green")
         position = run.folder.read_position()
         if not position:
-            return "[dim]-[/dim]"
+            return Text("-", "dim")
         if run.network not in self._recipes:  # a rule
-            return f"{position:.0%}"
-        return f"{position:.1f} / {self._recipes[run.network].epochs}"
+            return Text(f"{position:.0%}")
+        return Text(f"{position:.1f} / {self._recipes[run.network].epochs}")

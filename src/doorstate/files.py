@@ -1,12 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files appear whole or not at all: write beside the target, then rename."""
+"""Files appear whole or not at all: write beside the target, then rename. Rows of text as CSV."""
 
 from __future__ import annotations
 
+import csv
+import io
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+
+from doorstate.errors import DatasetError
 
 
 @contextmanager
@@ -31,3 +35,39 @@ def write_text(target: Path, text: str) -> None:
     """Write `text` as UTF-8 in one step."""
     with atomic_path(target) as temporary:
         temporary.write_text(text, encoding="utf-8")
+
+
+def write_csv(path: Path, rows: Sequence[Mapping[str, str]]) -> None:
+    """Write rows under the union of their columns, in order of appearance."""
+    names = list(dict.fromkeys(name for row in rows for name in row))
+    text = io.StringIO(newline="")
+    # Before Python 3.13 the writer leaves a lone carriage return unquoted, which reads back as the end of a line.
+    returns = any("\r" in value for row in rows for value in (*row, *row.values()))
+    writer = csv.DictWriter(
+        text,
+        names,
+        restval="",
+        lineterminator="\n",
+        quoting=csv.QUOTE_ALL if returns else csv.QUOTE_MINIMAL,
+    )
+    writer.writeheader()
+    writer.writerows(rows)
+    write_text(path, text.getvalue())
+
+
+def read_csv(path: Path) -> list[dict[str, str]]:
+    """Read a CSV with a header line.
+
+    Raises:
+        DatasetError: the file is missing, is not text, or a line has another number of columns than the header.
+    """
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as stream:
+            reader = csv.DictReader(stream, strict=True)
+            rows = list(reader)
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise DatasetError(f"{path}: cannot be read as CSV ({error})") from error
+    for number, row in enumerate(rows, start=2):
+        if None in row or None in row.values():
+            raise DatasetError(f"{path}: line {number} has another number of columns than the header")
+    return rows

@@ -10,11 +10,12 @@ import signal
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from multiprocessing.synchronize import Event
 from pathlib import Path
 from typing import NamedTuple, Self, TypeVar
 
-from doorstate.errors import ConfigError
+from doorstate.errors import ConfigError, RunError
 
 Piece = TypeVar("Piece")
 Progress = Callable[[int, int], None]  # (pieces done, pieces in all)
@@ -95,6 +96,10 @@ def run_pieces(
                 stop.set()
             # A second shutdown, by the with block, would not wait: workers would go on writing after the return.
             pool.shutdown(cancel_futures=True)
+            if isinstance(error, BrokenProcessPool):
+                raise RunError(
+                    "a worker was killed, perhaps for memory; go on with fewer at a time (--workers, --jobs)"
+                ) from error
             raise
 
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from doorstate.dataset.store import CLOUDS, MANIFEST, DatasetDescription
+from doorstate.files import write_csv
 from doorstate.simulation.generate import PRESETS
-from doorstate.simulation.manifest import write_csv
 from doorstate.simulation.run import SimulationSettings, simulate_dataset
 from doorstate.simulation.sensor import DepthCamera
 from doorstate.types import STATES

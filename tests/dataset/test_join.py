@@ -38,6 +38,15 @@ def test_a_joined_sample_is_rendered_again_from_its_row(scene_dataset: PreparedD
         assert {tuple(p) for p in kept.tolist()} <= {tuple(p) for p in raw.reshape(-1, 3).tolist()}
 
 
+def test_a_door_beside_scenes_is_rendered_again_too(
+    scene_dataset: PreparedDataset, small_dataset: PreparedDataset, tmp_path: Path
+) -> None:
+    varied = scene_dataset.folder.parent / "varied-160"
+    joined = join_datasets([small_dataset.folder, varied], tmp_path / "joined")
+    raw = joined.raw_cloud(4)
+    assert np.array_equal(raw, small_dataset.raw_cloud(4), equal_nan=True)
+
+
 def test_parts_are_left_out_where_one_does_not_know_them(
     scene_dataset: PreparedDataset, tmp_path: Path
 ) -> None:
@@ -53,7 +62,7 @@ def test_what_cannot_be_joined_is_refused(
     scene_dataset: PreparedDataset, prepared: Path, tmp_path: Path
 ) -> None:
     varied = scene_dataset.folder.parent / "varied-160"
-    with pytest.raises(DatasetError, match="is there 2 times"):
+    with pytest.raises(DatasetError, match="is there 2 times; data sets that share names cannot be joined"):
         join_datasets([varied, varied], tmp_path / "a")
     with pytest.raises(ConfigError, match=r"has 40 points a cloud, .* has 160"):
         join_datasets([varied, prepared], tmp_path / "b")

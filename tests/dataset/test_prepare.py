@@ -17,8 +17,9 @@ from doorstate.dataset.prepare import REJECTED, prepare_dataset
 from doorstate.dataset.store import CLOUDS, DESCRIPTION, MANIFEST, PARTS, open_dataset
 from doorstate.dataset.strata import distance_band, region
 from doorstate.errors import ConfigError, DatasetError
+from doorstate.files import read_csv, write_csv
 from doorstate.simulation.generate import replay
-from doorstate.simulation.manifest import read_csv, unflatten, write_csv
+from doorstate.simulation.manifest import unflatten
 from doorstate.types import STATES, Part
 
 NUM_POINTS = 256

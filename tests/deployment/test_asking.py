@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -110,6 +111,14 @@ def test_rows_hold_answers_and_what_is_known(asked: Asked) -> None:
     assert (rows[0]["file"], rows[0]["method"], rows[0]["door"]) == ("closed.pcd", "net", "wood")
     assert sum(float(rows[0][f"p_{state}"]) for state in STATES) == pytest.approx(1, abs=1e-4)
     assert rows[4]["predicted"] == NO_ANSWER
+
+
+def test_no_column_of_the_index_takes_the_place_of_an_answer(
+    methods: Methods, labelled: list[LabelledFrame]
+) -> None:
+    told = replace(labelled[0], columns={"predicted": "open", "p_open": "1", "note": "kept"})
+    (row,) = ask({"plane_state": methods["plane_state"]}, [told]).rows()
+    assert (row["predicted"], row["p_closed"], row["note"]) == ("closed", "1", "kept")
 
 
 def test_frames_that_most_methods_missed_come_first(asked: Asked) -> None:

@@ -253,7 +253,7 @@ def test_a_wrong_parameter_is_one_line(given: dict[str, Any], said: str) -> None
 
 def test_parameters_that_exclude_each_other_are_errors() -> None:
     for both in ({"points": 512}, {"weights": "door.onnx"}, {"budget_ms": 33.0}):
-        with pytest.raises(ConfigError, match="leave weights, points and budget_ms out"):
+        with pytest.raises(ConfigError, match="leave weights, points and time budget out"):
             parse_settings({"rule": "plane_state"} | both).load_predictor()
     with pytest.raises(ConfigError, match="give one of them"):
         parse_settings({"points": 512, "budget_ms": 33}).load_predictor()

@@ -14,8 +14,9 @@ import pytest
 from doorstate.dataset.splits import draw_splits, read_splits, write_splits
 from doorstate.dataset.store import CLOUDS, MANIFEST, PARTS, DatasetDescription, PreparedDataset, open_dataset
 from doorstate.dataset.strata import distance_band, region
+from doorstate.files import write_csv
 from doorstate.simulation.generate import draw_pose, find_preset, pose_indices
-from doorstate.simulation.manifest import flatten, write_csv
+from doorstate.simulation.manifest import flatten
 from doorstate.types import STATES, Part
 
 POSES = 40

@@ -20,7 +20,7 @@ from doorstate.evaluation.calibration import (
     reliability_figure,
 )
 from doorstate.evaluation.results import ComparisonResults, load_results
-from doorstate.simulation.manifest import read_csv, write_csv
+from doorstate.files import read_csv, write_csv
 from doorstate.training.calibration import fit_temperature
 
 

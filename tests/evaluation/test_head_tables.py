@@ -18,7 +18,7 @@ from doorstate.evaluation.report import write_everything
 from doorstate.evaluation.results import ComparisonResults, load_results
 from doorstate.evaluation.rule_tables import angle_table
 from doorstate.evaluation.table import UNDEFINED, Table
-from doorstate.simulation.manifest import write_csv
+from doorstate.files import write_csv
 from doorstate.types import NO_DOOR, STATES
 
 OFF = {

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from doorstate.clouds.depth import depth_to_points
 from doorstate.errors import ConfigError
+from doorstate.files import read_csv, write_csv
 from doorstate.simulation.generate import (
     PRESETS,
     Preset,
@@ -25,7 +26,7 @@ from doorstate.simulation.generate import (
     replay,
     simulate_pose,
 )
-from doorstate.simulation.manifest import flatten, read_csv, unflatten, write_csv
+from doorstate.simulation.manifest import flatten, unflatten
 from doorstate.simulation.placement import half_ring
 from doorstate.simulation.scene import Box, build_scene
 from doorstate.simulation.sensor import CameraPose, DepthCamera

@@ -3,15 +3,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from doorstate.errors import DatasetError
+from doorstate.files import read_csv, write_csv
 from doorstate.simulation.generate import PRESETS, SampleRow, draw_pose
-from doorstate.simulation.manifest import flatten, read_csv, unflatten, write_csv
+from doorstate.simulation.manifest import flatten, unflatten
 
 ROW = draw_pose(PRESETS["ogurob"], 0, 0)[0]
 _finite = st.floats(allow_nan=False, allow_infinity=False)
@@ -64,24 +63,6 @@ def test_a_damaged_line_is_named_in_one_line(column: str, value: str | None) -> 
         unflatten(columns)
     assert f"manifest line {ROW.sample_id}, column {column}: " in str(caught.value)
     assert "\n" not in str(caught.value)
-
-
-def test_rows_of_different_columns_share_one_header(tmp_path: Path) -> None:
-    write_csv(tmp_path / "a.csv", [{"a": "1"}, {"b": 'two, "2"', "a": "line\nbreak"}])
-    assert read_csv(tmp_path / "a.csv") == [{"a": "1", "b": ""}, {"a": "line\nbreak", "b": 'two, "2"'}]
-
-
-@pytest.mark.parametrize(
-    "content",
-    [None, b"a,b\n1\n", b"a,b\n1,2,3\n", b"a,b\n\xff\xfe,2\n", b'a,b\n"1"2,3\n'],
-    ids=["missing", "short", "long", "not UTF-8", "stray quote"],
-)
-def test_a_file_that_is_no_such_table_is_refused_by_name(tmp_path: Path, content: bytes | None) -> None:
-    path = tmp_path / "manifest.csv"
-    if content is not None:
-        path.write_bytes(content)
-    with pytest.raises(DatasetError, match=r"manifest\.csv: "):
-        read_csv(path)
 
 
 def test_an_extra_field_of_a_row_is_refused() -> None:

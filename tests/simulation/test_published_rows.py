@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from doorstate.files import write_csv
 from doorstate.simulation.generate import PRESETS, draw_pose, pose_indices, simulate_pose
-from doorstate.simulation.manifest import flatten, write_csv
+from doorstate.simulation.manifest import flatten
 
 PUBLISHED = Path(__file__).resolve().parents[2] / "data" / "ogurob" / "manifest.csv"
 PUBLISHED_SHA256 = "40c68044d112fd03756096433211f60bb3f3cbbc811f31de94592832dd2740ec"

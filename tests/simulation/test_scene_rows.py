@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from doorstate.files import read_csv, write_csv
 from doorstate.simulation.doors import leaf_boxes
 from doorstate.simulation.frames import replay
-from doorstate.simulation.manifest import flatten, read_csv, unflatten, write_csv
+from doorstate.simulation.manifest import flatten, unflatten
 from doorstate.simulation.no_door import FEATURES
 from doorstate.simulation.plan import collide
 from doorstate.simulation.scene import Box

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from doorstate.errors import ConfigError
+from doorstate.files import read_csv, write_csv
 from doorstate.simulation.frames import replay
 from doorstate.simulation.generate import PRESETS, simulate_pose
-from doorstate.simulation.manifest import Row, flatten, read_csv, unflatten, write_csv
+from doorstate.simulation.manifest import Row, flatten, unflatten
 from doorstate.simulation.noise.models import find_sensor
 from doorstate.simulation.scene_rows import ScenePreset, simulate_scene
 from doorstate.simulation.sensor import DepthCamera

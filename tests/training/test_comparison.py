@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -17,9 +18,10 @@ import pytest
 from doorstate.dataset.splits import read_splits
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import ConfigError, RunError
-from doorstate.simulation.manifest import read_csv
+from doorstate.files import read_csv
 from doorstate.training.comparison import Experiment, compare, load_experiment, prepare_comparison, runs_of
 from doorstate.training.resolution import load_study
+from doorstate.training.weights import read_card
 
 CHANGES = {"epochs": 4, "batch_size": 8, "precision": "fp32"}
 
@@ -111,8 +113,25 @@ def test_runs_go_on_from_the_weights_of_another_comparison(
     )
     compare(again, tmp_path / "again")
     one, other = outcome(tmp_path / "first"), outcome(tmp_path / "again")
+    cards = [
+        read_card(tmp_path / name / "runs" / "pointnet2" / "fold0" / "weights.safetensors")
+        for name in ("first", "again")
+    ]
+    assert cards[0] == cards[1], "weights that are only tested stay what they were trained on"
     name = "runs/pointnet2/fold0/predictions.csv"
     assert one[name] == other[name]
+
+
+def test_weights_that_have_learned_what_is_tested_are_not_gone_on_from(
+    small_dataset: PreparedDataset, tmp_path: Path
+) -> None:
+    prepare_comparison(experiment(small_dataset), tmp_path / "first")
+    other = experiment(small_dataset, protocol="all", folds=1)
+    prepare_comparison(other, tmp_path / "all")
+    for name, complains in (("first", False), ("all", True)):
+        again = experiment(small_dataset, start_from=str(tmp_path / name))
+        with pytest.raises(RunError, match="which is tested here") if complains else nullcontext():
+            prepare_comparison(again, tmp_path / f"after-{name}")
 
 
 def test_training_on_everything_tests_nothing(small_dataset: PreparedDataset, tmp_path: Path) -> None:

@@ -18,8 +18,8 @@ from doorstate.clouds.augment import Augmentation
 from doorstate.dataset.splits import Role, draw_splits
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import ConfigError, DatasetError, RunError, WeightsError
+from doorstate.files import read_csv
 from doorstate.networks.pointnet2 import PointNet2
-from doorstate.simulation.manifest import read_csv
 from doorstate.training import fit as fit_module
 from doorstate.training.fit import RunConfig, fit
 from doorstate.training.recipes import Recipe, Stage

@@ -14,8 +14,8 @@ from doorstate.dataset.prepare import prepare_dataset
 from doorstate.dataset.splits import Role
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import ConfigError, DatasetError
+from doorstate.files import read_csv
 from doorstate.rules import create_rule, list_rules
-from doorstate.simulation.manifest import read_csv
 from doorstate.training.comparison import Experiment, compare
 from doorstate.training.rule_run import RuleRunConfig, answer
 from doorstate.types import NO_ANSWER, STATES
@@ -67,8 +67,14 @@ def test_a_finished_run_is_not_asked_again_and_an_empty_one_refused(
     roles: dict[str, Role] = {doors.rows[0]["sample_id"]: "test"}
     first = answer(config("depth_region"), doors, roles, tmp_path / "a")
     assert answer(config("depth_region"), doors, {}, tmp_path / "a") == first
-    with pytest.raises(DatasetError, match="no sample is tested in fold 0"):
+    with pytest.raises(DatasetError, match="no sample with a door is tested in fold 0"):
         answer(config("depth_region"), doors, {}, tmp_path / "b")
+
+
+def test_a_rule_is_not_asked_for_the_state_of_no_door(scene_dataset: PreparedDataset, tmp_path: Path) -> None:
+    roles: dict[str, Role] = {row["sample_id"]: "test" for row in scene_dataset.rows[-14:]}
+    answer(config("depth_region"), scene_dataset, roles, tmp_path)
+    assert {row["state"] for row in read_csv(tmp_path / "predictions.csv")} <= set(STATES)
 
 
 def test_rules_stand_beside_networks_in_a_comparison(doors: PreparedDataset, tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ import pytest
 from doorstate.dataset.splits import draw_splits, read_splits, write_splits
 from doorstate.dataset.store import MANIFEST, PreparedDataset
 from doorstate.errors import ConfigError, RunError
-from doorstate.simulation.manifest import read_csv, write_csv
+from doorstate.files import read_csv, write_csv
 from doorstate.training.comparison import Experiment, compare, prepare_comparison
 from doorstate.training.run_folder import read_json
 from doorstate.training.transfer import TransferStudy, load_transfer

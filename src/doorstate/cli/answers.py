@@ -26,9 +26,9 @@ from doorstate.cli.options import (
     files_or_bag,
     read_options,
 )
-from doorstate.cli.predictions import load_predictor, table_cells
+from doorstate.cli.predictions import table_cells
 from doorstate.deployment.answers import described
-from doorstate.errors import ConfigError, DoorstateError
+from doorstate.errors import ConfigError, DoorstateError, MissingExtraError
 
 if TYPE_CHECKING:
     from doorstate.clouds.io import ReadOptions
@@ -73,6 +73,7 @@ def predict(
     """
     from doorstate.cli.bags import predict_bag
     from doorstate.clouds.io import find_clouds
+    from doorstate.deployment.loading import load_predictor
 
     files_or_bag(files, bag)
     if bag is None and (topic, camera_info_topic, every, out) != (None, None, 1, None):
@@ -99,9 +100,15 @@ def info(as_json: Annotated[bool, typer.Option("--json", help="As one JSON objec
     from doorstate.clouds.sampling import HAS_FPSAMPLE
     from doorstate.console import print_table
     from doorstate.deployment.predictor import packaged_networks
-    from doorstate.networks import create_network, list_networks
     from doorstate.rules import create_rule, list_rules
     from doorstate.training.environment import describe_environment
+
+    try:
+        from doorstate.networks import create_network, list_networks
+    except ImportError as error:
+        raise MissingExtraError(
+            f"info tells of networks, which need the package {error.name}: install it"
+        ) from error
 
     environment = describe_environment() | {"fpsample": HAS_FPSAMPLE}
     packaged = packaged_networks()
@@ -132,7 +139,7 @@ def _predict_files(predictor: Any, paths: list[Path], options: ReadOptions, as_j
             if as_json:
                 print(json.dumps(answer, ensure_ascii=False), flush=True)  # noqa: T201
             elif "error" in answer:
-                err.print(f"{answer['file']}: {answer['error']}", style="red", markup=False, soft_wrap=True)
+                err.print(f"{answer['file']}: {answer['error']}", style="red", soft_wrap=True)
             else:
                 rows.append([answer["file"], *table_cells(answer)])
             progress(number + 1, len(paths))

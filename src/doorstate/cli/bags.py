@@ -62,7 +62,7 @@ def hint_at_frame(topic: BagTopic, options: ReadOptions, frame_id: str) -> None:
 
     if topic.type == CLOUD and options.frame == "body" and is_optical(frame_id):
         hint = f"{topic.name} is in the frame {frame_id}: is --frame optical missing?"
-        err.print(hint, markup=False, soft_wrap=True)
+        err.print(hint, soft_wrap=True)
 
 
 def _answers(predictor: Any, clouds: Iterable[StampedCloud]) -> Iterator[tuple[dict[str, Any], str]]:
@@ -111,7 +111,7 @@ def _printed_table() -> Iterator[Write]:
     def write(answer: dict[str, Any]) -> None:
         stamp = "-" if answer["stamp_s"] is None else f"{answer['stamp_s']:.6f}"
         if "error" in answer:
-            err.print(f"{stamp}: {answer['error']}", style="red", markup=False, soft_wrap=True)
+            err.print(f"{stamp}: {answer['error']}", style="red", soft_wrap=True)
         else:
             rows.append([stamp, *table_cells(answer)])
 
@@ -125,9 +125,10 @@ def _json_lines(stream: Any) -> Write:
 
 
 def _csv_rows(stream: Any) -> Write:
+    from doorstate.deployment.answers import FURTHER
     from doorstate.types import STATES
 
-    columns = ["stamp_s", "state", *STATES, "points", "milliseconds", "opening_angle_deg", "reason", "error"]
+    columns = ["stamp_s", "state", *STATES, "points", "milliseconds", *FURTHER, "reason", "error"]
     rows = csv.DictWriter(stream, columns, lineterminator="\n")
     rows.writeheader()
 

@@ -155,7 +155,7 @@ def prepare(
     with progress_bar("Preparing") as progress:
         summary = prepare_dataset(source, out, points, poses, options, workers, progress, layout)
     for row in summary.rejected[:10]:
-        err.print(f"left out {row['file'] or row['sample_id']}: {row['reason']}", markup=False)
+        err.print(f"left out {row['file'] or row['sample_id']}: {row['reason']}")
     if summary.rejected:
         err.print(f"{len(summary.rejected)} clouds left out, all in {out / 'rejected.csv'}")
     names = (*STATES, NO_DOOR)

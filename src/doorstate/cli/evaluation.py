@@ -21,7 +21,6 @@ from doorstate.cli.options import (
     Units,
     read_options,
 )
-from doorstate.cli.predictions import load_predictor
 from doorstate.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -102,7 +101,7 @@ def evaluate(
         asked = ask(methods, frames, progress)
     for each, reason in asked.unreadable:
         message = f"{each.file}: {reason.removeprefix(f'{each.file}: ')}"
-        err.print(message, style="red", markup=False, soft_wrap=True)
+        err.print(message, style="red", soft_wrap=True)
     if not asked.frames:
         raise ConfigError(f"{folder}: none of {len(frames)} files could be read")
     metrics = asked.metrics(group, by or ())
@@ -111,14 +110,14 @@ def evaluate(
         print(json.dumps(metrics))  # noqa: T201
     else:
         for note in notes:
-            stdout.print(note, markup=False, soft_wrap=True)
+            stdout.print(note, soft_wrap=True)
         for table in tables.values():
             print_table(table.title, table.columns, table.rows)
             if table.note:
-                stdout.print(table.note, markup=False, soft_wrap=True)
+                stdout.print(table.note, soft_wrap=True)
     if out is not None:
         page = _write(out, folder, methods, asked, metrics, tables, notes, everything)
-        err.print(f"{page} shows the frames", markup=False, soft_wrap=True)
+        err.print(f"{page} shows the frames", soft_wrap=True)
     if asked.unreadable:
         err.print(f"{len(asked.unreadable)} of {len(frames)} files could not be read and are not counted")
         raise typer.Exit(1)
@@ -131,6 +130,7 @@ def _methods(
     points: int | None,
 ) -> Methods:
     """Who is asked, by name; the default network if nobody is named."""
+    from doorstate.deployment.loading import load_predictor
     from doorstate.deployment.predictor import DEFAULT_NETWORK
 
     asked: list[tuple[str, Path | None, str | None]] = [
@@ -163,8 +163,7 @@ def _write(
     from doorstate.console import progress_bar
     from doorstate.deployment.frame_page import choose_frames, frame_cards, render_frame_page
     from doorstate.evaluation.tables import save_tables
-    from doorstate.files import write_text
-    from doorstate.simulation.manifest import write_csv
+    from doorstate.files import write_csv, write_text
 
     name = folder.resolve().name
     write_csv(out / "predictions.csv", asked.rows())

@@ -33,7 +33,7 @@ def resolution(
         resolution_table,
         write_resolution,
     )
-    from doorstate.simulation.manifest import write_csv
+    from doorstate.files import write_csv
     from doorstate.training.comparison import run_of
     from doorstate.training.environment import keep_freed_memory
     from doorstate.training.resolution import AS_TRAINED, load_study

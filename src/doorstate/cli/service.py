@@ -49,18 +49,20 @@ def serve(
         raise MissingExtraError(
             'serve needs the packages fastapi and uvicorn: pip install "doorstate[serve]"'
         ) from error
-    import torch
-
     from doorstate.deployment.predictor import Predictor
     from doorstate.jobs import default_workers
     from doorstate.training.environment import keep_freed_memory
 
     workers = workers or default_workers()
     limits = Limits(int(max_megabytes * 2**20), timeout_s, queue, workers)
+    threads = max(1, default_workers() // workers)
     keep_freed_memory()
-    torch.set_num_threads(max(1, default_workers() // workers))
-    predictor = Predictor.load(weights or network, points)
+    predictor = Predictor.load(weights or network, points, threads=threads)
     predictor.warm_up()
+    if weights is None or weights.suffix != ".onnx":
+        import torch
+
+        torch.set_num_threads(threads)
     listening = _listen(host, port)
     server = uvicorn.Server(
         uvicorn.Config(
@@ -78,7 +80,7 @@ def serve(
     address = f"[{host}]" if ":" in host else host
     print(  # noqa: T201
         f"doorstate: listening on http://{address}:{listening.getsockname()[1]} "
-        f"({predictor.card.network}, {predictor.points} points, workers: {workers})",
+        f"({predictor}, workers: {workers})",
         flush=True,
     )
     server.run(sockets=[listening])

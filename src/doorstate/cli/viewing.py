@@ -32,7 +32,6 @@ from doorstate.cli.options import (
     files_or_bag,
     read_options,
 )
-from doorstate.cli.predictions import load_predictor
 from doorstate.errors import CloudReadError, ConfigError
 
 if TYPE_CHECKING:
@@ -95,6 +94,8 @@ def view(
       doorstate view --live --bag run.bag --topic /camera/depth/points --frame optical
       doorstate view --live incoming/ --port 8080 --no-open
     """
+    from doorstate.deployment.loading import load_predictor
+
     files_or_bag(files, bag)
     if bag is None and (topic, camera_info_topic) != (None, None):
         raise ConfigError("--topic and --camera-info-topic are for --bag")
@@ -185,7 +186,7 @@ def _show_page(
     failed = [entry for entry in entries if "error" in entry]
     for entry in failed:
         message = entry["error"].removeprefix(f"{Path(entry['name']).name}: ")
-        err.print(f"{entry['name']}: {message}", style="red", markup=False, soft_wrap=True)
+        err.print(f"{entry['name']}: {message}", style="red", soft_wrap=True)
     if len(failed) < len(entries):
         page = render_view(predictor, entries)
         path = out or Path(tempfile.mkdtemp(prefix="doorstate-")) / "view.html"
@@ -226,4 +227,4 @@ def _open(address: str) -> None:
     from doorstate.console import err
 
     if not webbrowser.open(address):
-        err.print(f"no browser was found here: open {address} in one", markup=False, soft_wrap=True)
+        err.print(f"no browser was found here: open {address} in one", soft_wrap=True)

@@ -24,8 +24,8 @@ def export_sdf(
       doorstate export-sdf data/ogurob p0655-closed p0655-open --out worlds
     """
     from doorstate.console import out as stdout
-    from doorstate.files import write_text
-    from doorstate.simulation.manifest import read_csv, unflatten
+    from doorstate.files import read_csv, write_text
+    from doorstate.simulation.manifest import unflatten
     from doorstate.simulation.run import MANIFEST
     from doorstate.simulation.sdf import sdf_world
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import math
 import re
-import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -151,13 +150,10 @@ def parse_cloud(data: bytes, suffix: str, options: ReadOptions = DEFAULT_OPTIONS
     if not data:
         raise CloudReadError("is empty (0 bytes)")
     try:
-        # What a library warns of in foreign bytes either ends in an error below or is of no concern.
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            stored = _PARSERS[suffix](data)
-            is_depth = suffix == ".png" or (stored.ndim == 2 and stored.shape[1] > _MAX_POINT_VALUES)
-            check_points(math.prod(stored.shape if is_depth else stored.shape[:-1]))
-            return points_from_depth(stored, options) if is_depth else _points_from_rows(stored, options)
+        stored = _PARSERS[suffix](data)
+        is_depth = suffix == ".png" or (stored.ndim == 2 and stored.shape[1] > _MAX_POINT_VALUES)
+        check_points(math.prod(stored.shape if is_depth else stored.shape[:-1]))
+        return points_from_depth(stored, options) if is_depth else _points_from_rows(stored, options)
     except DoorstateError:
         raise
     except Exception as error:

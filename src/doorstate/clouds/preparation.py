@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,7 +83,7 @@ def prepare_cloud(
     return PreparedCloud(clean[chosen], measured[chosen])
 
 
-def is_measured(points: Points) -> NDArray[np.bool_]:
+def is_measured(points: NDArray[np.floating[Any]]) -> NDArray[np.bool_]:
     """Which (..., 3) points are something: not NaN, infinite, beyond all measure or (0, 0, 0)."""
     x, y, z = (np.abs(points[..., axis]) for axis in range(3))
     found: NDArray[np.bool_] = (

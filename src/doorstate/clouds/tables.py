@@ -72,6 +72,7 @@ def parse_rows(body: bytes, columns: Sequence[int], count: int, skip: int = 0) -
 
 
 def _load(rows: Sequence[str], columns: Sequence[int], delimiter: str | None) -> NDArray[np.float64]:
+    rows = [row for row in rows if not row.lstrip().startswith("#")]
     if not rows:
         return np.empty((0, 3))
     try:

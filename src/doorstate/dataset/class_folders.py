@@ -13,7 +13,7 @@ from typing import TypeVar
 from doorstate.clouds.io import find_clouds
 from doorstate.dataset.strata import distance_band, polar, region
 from doorstate.errors import DatasetError
-from doorstate.simulation.manifest import read_csv
+from doorstate.files import read_csv
 from doorstate.types import NO_DOOR, DoorState
 
 # Order matters: "semi-open" and "half closed" hold the other words too.
@@ -25,6 +25,7 @@ _SPELLINGS = (
 _WORDS = re.compile(
     r"(semi|half|yari|ajar|partly|partially|partial|opened|open|closed|close|shut|doors?|is|the|aralik|kapali|acik)+"
 )
+_UNITS = ("_m", "_deg", "_px", "_share")
 _NO_DOOR = re.compile(r"none|(no|without)(an?y?)?(clear)?doors?")
 Meaning = TypeVar("Meaning")
 
@@ -120,24 +121,30 @@ def _read_poses(path: Path) -> dict[str, dict[str, str]]:
             raise DatasetError(f"{path}: line {number} names {name!r} a second time")
         for reserved in ("sample_id", "state"):
             row.pop(reserved, None)
+        _check_quantities(row, f"{path}: line {number}")
         poses[name] = row | _strata(row, f"{path}: line {number}")
     return poses
 
 
+def _check_quantities(row: dict[str, str], where: str) -> None:
+    """Raise DatasetError for text under a name that ends in a unit: reports and heads count on numbers there."""
+    for name, value in row.items():
+        try:
+            if value and name.endswith(_UNITS) and not math.isfinite(float(value)):
+                raise ValueError
+        except ValueError as error:
+            raise DatasetError(f"{where}: {name} is {value!r}, not a number") from error
+
+
 def _strata(row: dict[str, str], where: str) -> dict[str, str]:
-    try:
-        if row.get("x_m") and row.get("y_m"):
-            distance_m, angle_deg = polar(float(row["x_m"]), float(row["y_m"]))
-            pose_id = row.get("pose_id") or f"{float(row['x_m']):.3f},{float(row['y_m']):.3f}"
-        elif row.get("distance_m") and row.get("robot_angle_deg"):
-            distance_m, angle_deg = float(row["distance_m"]), float(row["robot_angle_deg"])
-            pose_id = row.get("pose_id") or f"{distance_m:.3f},{angle_deg:.3f}"
-        else:
-            raise DatasetError(f"{where}: needs x_m and y_m, or distance_m and robot_angle_deg")
-    except ValueError as error:
-        raise DatasetError(f"{where}: {error}") from error
-    if not (math.isfinite(distance_m) and math.isfinite(angle_deg)):
-        raise DatasetError(f"{where}: the pose must be finite numbers")
+    if row.get("x_m") and row.get("y_m"):
+        distance_m, angle_deg = polar(float(row["x_m"]), float(row["y_m"]))
+        pose_id = row.get("pose_id") or f"{float(row['x_m']):.3f},{float(row['y_m']):.3f}"
+    elif row.get("distance_m") and row.get("robot_angle_deg"):
+        distance_m, angle_deg = float(row["distance_m"]), float(row["robot_angle_deg"])
+        pose_id = row.get("pose_id") or f"{distance_m:.3f},{angle_deg:.3f}"
+    else:
+        raise DatasetError(f"{where}: needs x_m and y_m, or distance_m and robot_angle_deg")
     return {
         "pose_id": pose_id,
         "distance_m": str(distance_m),

@@ -19,8 +19,7 @@ from doorstate.dataset.store import (
     open_dataset,
 )
 from doorstate.errors import ConfigError, DatasetError
-from doorstate.files import atomic_path, is_vacant
-from doorstate.simulation.manifest import write_csv
+from doorstate.files import atomic_path, is_vacant, write_csv
 
 
 def join_datasets(sources: Sequence[Path], folder: Path) -> PreparedDataset:
@@ -42,7 +41,9 @@ def join_datasets(sources: Sequence[Path], folder: Path) -> PreparedDataset:
     rows = [row for part in parts for row in part.rows]
     name, count = Counter(row["sample_id"] for row in rows).most_common(1)[0]
     if count > 1:
-        raise DatasetError(f"sample {name!r} is there {count} times; simulate with different seeds")
+        raise DatasetError(
+            f"sample {name!r} is there {count} times; data sets that share names cannot be joined"
+        )
     folder.mkdir(parents=True, exist_ok=True)
     _stack(folder / CLOUDS, [part.clouds for part in parts])
     if all(part.knows_parts for part in parts):

@@ -14,7 +14,7 @@ from doorstate.clouds.io import DEFAULT_OPTIONS, ReadOptions, find_clouds, read_
 from doorstate.dataset.class_folders import label_of_folder, nearest, row_of
 from doorstate.dataset.layouts import find_layout
 from doorstate.errors import ConfigError, DatasetError
-from doorstate.simulation.manifest import read_csv
+from doorstate.files import read_csv
 from doorstate.types import Points
 
 INDEX = "index.csv"

@@ -14,9 +14,9 @@ from torch import Tensor
 from doorstate.clouds.augment import Augmentation, AugmentationDraw, apply_augmentation, draw_augmentation
 from doorstate.clouds.preparation import centroids, normalize
 from doorstate.dataset.store import PreparedDataset
-from doorstate.dataset.targets import DOOR, NO_STATE, PARTS, augmented, door_targets, known_parts
+from doorstate.dataset.targets import NO_STATE, augmented, door_targets, known_parts
 from doorstate.errors import ConfigError
-from doorstate.types import DoorState
+from doorstate.types import DOOR, PARTS, DoorState
 
 FindNeighbours = Callable[[Tensor], tuple[Tensor, ...]]
 """From (B, n, 3) points to (B, ...) int64 indices into them."""

@@ -29,10 +29,10 @@ from doorstate.dataset.store import (
 )
 from doorstate.dataset.strata import distance_band, region
 from doorstate.errors import CameraError, CloudError, ConfigError, DatasetError
-from doorstate.files import atomic_path, is_vacant, write_text
+from doorstate.files import atomic_path, is_vacant, read_csv, write_csv, write_text
 from doorstate.jobs import Progress, Shard, default_workers, no_progress, piece_paths, run_pieces
 from doorstate.simulation.generate import replay
-from doorstate.simulation.manifest import read_csv, unflatten, write_csv
+from doorstate.simulation.manifest import unflatten
 from doorstate.simulation.run import MANIFEST as SIMULATED_MANIFEST
 from doorstate.simulation.run import is_simulated, read_settings
 from doorstate.types import Points
@@ -134,6 +134,10 @@ def _plan(
     """Claim the folder, and say what is to be done and where it goes."""
     options = options or ReadOptions()
     simulated = layout is None and is_simulated(source)
+    if simulated and (poses_csv is not None or options != ReadOptions()):
+        raise ConfigError(
+            f"{source}: is simulated and knows its poses and its camera: leave their options out"
+        )
     if layout is not None:
         rows = find_layout(layout).rows(source)
     else:

@@ -28,7 +28,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from doorstate.errors import ConfigError, DatasetError
-from doorstate.simulation.manifest import read_csv, write_csv
+from doorstate.files import read_csv, write_csv
 
 Role = Literal["train", "val", "test", "unused"]
 Row = Mapping[str, str]

@@ -16,9 +16,9 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from doorstate.dataset.sampled import sample_frame
 from doorstate.errors import ConfigError, DatasetError
-from doorstate.files import write_text
+from doorstate.files import read_csv, write_text
 from doorstate.simulation.generate import replay
-from doorstate.simulation.manifest import read_csv, unflatten
+from doorstate.simulation.manifest import unflatten
 from doorstate.simulation.shading import shade
 from doorstate.types import NO_DOOR, STATES, Indices, Points
 

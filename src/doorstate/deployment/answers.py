@@ -17,23 +17,39 @@ def described(prediction: Prediction) -> dict[str, Any]:
         "points": prediction.points,
         "milliseconds": round(prediction.milliseconds, 3),
         **({"reason": prediction.reason} if prediction.state is None else {}),
-        **{name: value for name, value in _further(prediction).items() if value is not None},
+        **{
+            name: value
+            for name, value in zip(FURTHER, _further(prediction), strict=True)
+            if value is not None
+        },
     }
 
 
-def _further(prediction: Prediction) -> dict[str, Any]:
-    """What some methods say besides the state."""
+FURTHER = (
+    "door_probability",
+    "opening_angle_deg",
+    "hinge",
+    "door_x_m",
+    "door_y_m",
+    "door_yaw_deg",
+    "opening_width_m",
+    "passable_width_m",
+)
+"""What some methods say besides the state."""
+
+
+def _further(prediction: Prediction) -> tuple[float | str | None, ...]:
     frame = prediction.frame
-    return {
-        "door_probability": _rounded(prediction.door_probability, 4),
-        "opening_angle_deg": _rounded(prediction.opening_angle_deg, 1),
-        "hinge": prediction.hinge,
-        "door_x_m": None if frame is None else round(frame.x_m, 3),
-        "door_y_m": None if frame is None else round(frame.y_m, 3),
-        "door_yaw_deg": None if frame is None else round(frame.yaw_deg, 1),
-        "opening_width_m": _rounded(prediction.opening_width_m, 3),
-        "passable_width_m": _rounded(prediction.passable_width_m, 3),
-    }
+    return (
+        _rounded(prediction.door_probability, 4),
+        _rounded(prediction.opening_angle_deg, 1),
+        prediction.hinge,
+        None if frame is None else round(frame.x_m, 3),
+        None if frame is None else round(frame.y_m, 3),
+        None if frame is None else round(frame.yaw_deg, 1),
+        _rounded(prediction.opening_width_m, 3),
+        _rounded(prediction.passable_width_m, 3),
+    )
 
 
 def _rounded(value: float | None, digits: int) -> float | None:

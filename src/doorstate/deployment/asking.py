@@ -53,7 +53,8 @@ class Asked:
     def rows(self) -> list[dict[str, str]]:
         """One line for each frame and method, with whatever else is known of the frame."""
         return [
-            {
+            dict(frame.columns)
+            | {
                 "file": frame.file,
                 "state": frame.label,
                 "method": method,
@@ -62,7 +63,6 @@ class Asked:
                 "p_door": "" if said.door_probability is None else f"{said.door_probability:.5g}",
                 "found_angle_deg": "" if said.opening_angle_deg is None else f"{said.opening_angle_deg:.1f}",
                 "reason": said.reason,
-                **frame.columns,
             }
             for method, predictions in self.predictions.items()
             for frame, said in zip(self.frames, predictions, strict=True)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 import matplotlib as mpl
@@ -159,7 +160,8 @@ def _pictures(frame: LabelledFrame, cloud: Points) -> dict[str, str]:
     pictures = {}
     colour = frame.columns.get("rgb", "")
     if colour and (frame.folder / colour).is_file():
-        with Image.open(frame.folder / colour) as image:
+        # A picture to look at is no reason to lose the page.
+        with suppress(OSError), Image.open(frame.folder / colour) as image:
             pictures["colour"] = picture_uri(np.asarray(image.convert("RGB")))
     if cloud.ndim == 3:
         pictures["depth"] = picture_uri(_depth_picture(cloud))

@@ -8,6 +8,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Iterator
+from contextlib import suppress
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from types import TracebackType
@@ -42,7 +43,6 @@ class LivePage:
             raise ConfigError(
                 f"--port {port}: {error.strerror or error}; 0 takes any that is free"
             ) from error
-        self._server.daemon_threads = True
         self.address = f"http://127.0.0.1:{self._server.server_address[1]}/"
 
     def __enter__(self) -> LivePage:
@@ -91,6 +91,10 @@ class LivePage:
 def _handler(live: LivePage, page: bytes) -> type[BaseHTTPRequestHandler]:
     class Handler(BaseHTTPRequestHandler):
         def do_GET(self) -> None:
+            with suppress(ConnectionError):  # the browser has gone
+                self._answer()
+
+        def _answer(self) -> None:
             # A page of somebody else that gave its name our address must not read what the robot sees.
             if self.headers.get("Host", "").split(":")[0] not in _OUR_NAMES:
                 self.send_error(HTTPStatus.FORBIDDEN, "Ask for 127.0.0.1 or localhost")
@@ -111,11 +115,8 @@ def _handler(live: LivePage, page: bytes) -> type[BaseHTTPRequestHandler]:
 
         def _send_events(self) -> None:
             last = self.headers.get("Last-Event-ID", "")  # of a browser that lost the connection
-            try:
-                for text in live.events_after(int(last) if last.isdecimal() else 0):
-                    self.wfile.write(text.encode())
-            except ConnectionError:
-                return  # the browser has gone
+            for text in live.events_after(int(last) if last.isdecimal() else 0):
+                self.wfile.write(text.encode())
 
         def log_message(self, format: str, *args: Any) -> None:
             """Say nothing: standard error is the command's."""

@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from doorstate.clouds.preparation import centroids
-from doorstate.dataset.targets import PARTS
 from doorstate.errors import CloudContentError, MissingExtraError, WeightsError
 from doorstate.training.answers import Columns, in_metres
 from doorstate.training.card import WeightsCard
-from doorstate.types import STATES, Points
+from doorstate.types import PARTS, STATES, Points
 
 INPUT, OUTPUT = "points", "probabilities"
 CARD = "doorstate"  # of the file's metadata

@@ -120,6 +120,7 @@ class Predictor:
         thin: bool = True,
         gate: Gate | None = DEFAULT_GATE,
         budget_ms: float | None = None,
+        threads: int | None = None,
         clock: Callable[[], float] = time.perf_counter,
     ) -> Predictor:
         """Load packaged weights by network name, or any weights file by path.
@@ -133,6 +134,7 @@ class Predictor:
             budget_ms: in place of `points`: the most of `BUDGET_POINTS` that this machine, measured now, takes no more
                 time for, from a raw 640 x 480 cloud to an answer; the fewest if all take more, and never more
                 than the weights were trained with. An `.onnx` file takes the one number it was exported for.
+            threads: that an `.onnx` file takes for one answer, as of `OnnxNetwork`; torch's are the process's.
             clock: as of the class.
 
         Raises:
@@ -145,7 +147,7 @@ class Predictor:
             raise ConfigError(
                 f"a budget of {budget_ms} ms with {points} points: give one of them, above zero"
             )
-        network, card = _load(name_or_path)
+        network, card = _load(name_or_path, threads)
 
         def looking_at(count: int) -> Predictor:
             return cls(network, card, count, thin=thin, gate=gate, clock=clock)
@@ -162,6 +164,9 @@ class Predictor:
                 break
             chosen = larger
         return chosen
+
+    def __str__(self) -> str:
+        return f"{self.card.network}, {self.points} points"
 
     def __call__(self, points: Points) -> Prediction:
         """State of the door in a cloud, or none with the reason: the gate's, no door, or too little certainty.
@@ -263,10 +268,10 @@ def _frame(told: Mapping[str, float]) -> DoorFrame | None:
     return DoorFrame(told["door_x_m"], told["door_y_m"], told["door_yaw_deg"])
 
 
-def _load(name_or_path: str | Path) -> tuple[PointNetwork | OnnxNetwork, WeightsCard]:
+def _load(name_or_path: str | Path, threads: int | None) -> tuple[PointNetwork | OnnxNetwork, WeightsCard]:
     path = Path(name_or_path)
     if path.suffix == ".onnx":
-        exported = OnnxNetwork(path)
+        exported = OnnxNetwork(path, threads)
         return exported, exported.card
     if path.suffix != ".safetensors":
         path = packaged_weights(str(name_or_path))

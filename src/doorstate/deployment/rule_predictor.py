@@ -41,6 +41,9 @@ class RulePredictor:
         """
         return cls(create_rule(name), gate=gate)
 
+    def __str__(self) -> str:
+        return f"rule {self.rule.name}"
+
     def __call__(self, points: Points) -> Prediction:
         """State of the door in a cloud, or none with the reason; a given state has probability 1.
 
@@ -66,6 +69,3 @@ class RulePredictor:
             opening_width_m=answer.opening_width_m,
             found=answer.found,
         )
-
-    def warm_up(self) -> None:
-        """Nothing to load."""

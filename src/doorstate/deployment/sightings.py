@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from doorstate.clouds.io import DEFAULT_OPTIONS, ReadOptions, find_clouds, read_cloud
 from doorstate.dataset.store import DESCRIPTION, PreparedDataset, open_dataset
 from doorstate.errors import CloudReadError, DatasetError, DoorstateError
+from doorstate.files import read_csv
 from doorstate.simulation.generate import replay
-from doorstate.simulation.manifest import read_csv, unflatten
+from doorstate.simulation.manifest import unflatten
 from doorstate.simulation.run import MANIFEST, is_simulated
 from doorstate.types import Points
 

@@ -74,14 +74,10 @@ def render_view(predictor: Predictor | RulePredictor, entries: Sequence[Entry], 
         entries: of `look`; may be none in a live page.
         live: more entries come as server-sent events from `events` beside the page.
     """
-    if isinstance(predictor, Predictor):
-        asked = f"{predictor.card.network}, {predictor.points} points"
-    else:
-        asked = f"rule {predictor.rule.name}"
     return render_page(
         "view.html.j2",
         "doorstate.deployment",
-        asked=asked,
+        asked=str(predictor),
         live=live,
         page_data={
             "entries": list(entries),

@@ -95,9 +95,7 @@ class DoorWatch:
     @property
     def answerer(self) -> str:
         """Who answers, for a log."""
-        if isinstance(self._predictor, RulePredictor):
-            return f"rule {self._predictor.rule.name}"
-        return f"{self._predictor.card.network}, {self._predictor.points} points"
+        return str(self._predictor)
 
     def is_due(self, now_s: float) -> bool:
         """Whether a message that comes now is to be answered, by `max_hz`; the seconds are of any steady clock."""

@@ -4,16 +4,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from doorstate.clouds.io import UNITS_M, ReadOptions
 from doorstate.clouds.messages import CLOUD, COMPRESSED_IMAGE, IMAGE
+from doorstate.deployment.loading import load_predictor
 from doorstate.deployment.predictor import DEFAULT_GATE, DEFAULT_NETWORK, Predictor
 from doorstate.deployment.rule_predictor import RulePredictor
 from doorstate.errors import ConfigError
-from doorstate.training.environment import keep_freed_memory
 
 MESSAGE_TYPES = {"cloud": CLOUD, "depth": IMAGE, "compressed_depth": COMPRESSED_IMAGE}  # by input
 
@@ -60,27 +61,15 @@ class WatchSettings(BaseModel):
         return ReadOptions(frame, self.roll, None, self.depth_scale, UNITS_M[self.units])
 
     def load_predictor(self) -> Predictor | RulePredictor:
-        """Who answers, ready for the first cloud.
-
-        Raises:
-            ConfigError: parameters that exclude each other, or no such rule.
-            WeightsError: no such weights, or they cannot be used.
-            MissingExtraError: what the weights need is not installed.
-        """
-        gate = DEFAULT_GATE if self.gate else None
-        if self.rule and (self.weights or self.points or self.budget_ms):
-            raise ConfigError(
-                "a rule has no weights and looks at all points: leave weights, points and budget_ms out"
-            )
-        keep_freed_memory()
-        predictor: Predictor | RulePredictor
-        if self.rule:
-            predictor = RulePredictor.load(self.rule, gate=gate)
-        else:
-            name = self.weights or self.network
-            predictor = Predictor.load(name, self.points or None, gate=gate, budget_ms=self.budget_ms or None)
-        predictor.warm_up()
-        return predictor
+        """Who answers; errors as of `doorstate.deployment.loading.load_predictor`."""
+        return load_predictor(
+            self.network,
+            Path(self.weights) if self.weights else None,
+            self.rule or None,
+            self.points or None,
+            budget_ms=self.budget_ms or None,
+            gate=DEFAULT_GATE if self.gate else None,
+        )
 
 
 def parse_settings(given: Mapping[str, Any]) -> WatchSettings:

@@ -17,7 +17,7 @@ from doorstate.evaluation.score_tables import pooled_confusion
 from doorstate.evaluation.table import Table, number
 from doorstate.evaluation.tables import save_tables
 from doorstate.evaluation.views import NETWORK_COLORS
-from doorstate.simulation.manifest import read_csv
+from doorstate.files import read_csv
 from doorstate.training.resolution import AS_TRAINED, FINE_TUNED
 
 LATENCY = "latency.csv"

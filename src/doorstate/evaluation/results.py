@@ -19,8 +19,8 @@ from doorstate.dataset.store import MANIFEST
 from doorstate.errors import DatasetError, RunError
 from doorstate.evaluation.found_shapes import Found, read_found
 from doorstate.evaluation.metrics import Floats
+from doorstate.files import read_csv
 from doorstate.rules.base import Shape
-from doorstate.simulation.manifest import read_csv
 from doorstate.training.comparison import run_of
 from doorstate.training.run_folder import RunFolder, read_json
 from doorstate.types import ANSWERS, NO_DOOR, STATES, Indices

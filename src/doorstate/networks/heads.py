@@ -19,7 +19,7 @@ from doorstate.errors import ConfigError
 from doorstate.networks.base import Neighbourhoods, PointNetwork
 from doorstate.networks.layers import Dense, glorot
 from doorstate.networks.ops import at_least_float32, full_precision
-from doorstate.types import Part
+from doorstate.types import PARTS, Part
 
 Targets = Mapping[str, Tensor]
 """By head's name: (B, `answers`) float targets, NaN where unknown."""
@@ -124,8 +124,6 @@ HEADS: dict[str, type[Head]] = {
 }
 STATE = "state"
 """Name of what the network's own head says."""
-PARTS = "parts"
-"""Name of the per-point answer, of networks with a per-point branch (`PointNetwork.part_branch`)."""
 
 
 def give_heads(network: PointNetwork, names: Sequence[str], num_parts: int = len(Part) - 1) -> None:

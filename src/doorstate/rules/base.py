@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
+from doorstate.clouds.preparation import is_measured
 from doorstate.types import DoorState, Points
 
 
@@ -73,8 +74,7 @@ class Rule(ABC, Generic[P]):
 
 
 def measured(cloud: Points) -> NDArray[np.float64]:
-    """(M, 3) points that were measured, of a flat or organized cloud; zeros count as not measured."""
+    """(M, 3) points that were measured, of a flat or organized cloud."""
     flat = np.asarray(cloud, dtype=np.float64).reshape(-1, 3)
-    finite = np.isfinite(flat).all(axis=1)
-    kept: NDArray[np.float64] = flat[finite & (flat != 0).any(axis=1)]
+    kept: NDArray[np.float64] = flat[is_measured(flat)]
     return kept

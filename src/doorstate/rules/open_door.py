@@ -17,6 +17,7 @@ import numpy as np
 from pydantic import Field
 from scipy.spatial import cKDTree
 
+from doorstate.clouds.preparation import is_measured
 from doorstate.rules.base import Answer, Parameters, Rule, Shape
 from doorstate.rules.plan_lines import Flags, Floats, Line, strongest_line
 from doorstate.rules.planes import thin
@@ -105,7 +106,7 @@ class OpenDoorRule(Rule[OpenDoorParameters]):
 
     def _view(self, cloud: Points) -> _View:
         flat = np.asarray(cloud).reshape(-1, 3)
-        pixels = np.flatnonzero(np.isfinite(flat).all(axis=1) & (flat != 0).any(axis=1))
+        pixels = np.flatnonzero(is_measured(flat))
         points = flat[pixels].astype(np.float64)
         row, column = np.divmod(pixels, cloud.shape[1])
         same_row = np.diff(row) == 0

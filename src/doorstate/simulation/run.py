@@ -19,10 +19,10 @@ from pydantic import TypeAdapter, ValidationError
 
 from doorstate.clouds.pcd import write_pcd
 from doorstate.errors import ConfigError, DatasetError
-from doorstate.files import atomic_path, is_vacant, write_text
+from doorstate.files import atomic_path, is_vacant, read_csv, write_csv, write_text
 from doorstate.jobs import Progress, Shard, default_workers, no_progress, piece_paths, run_pieces
 from doorstate.simulation.frames import Frame
-from doorstate.simulation.manifest import Row, flatten, read_csv, write_csv
+from doorstate.simulation.manifest import Row, flatten
 from doorstate.simulation.settings import RAW_KINDS as RAW_KINDS
 from doorstate.simulation.settings import RawKind, Settings
 from doorstate.simulation.settings import SimulationSettings as SimulationSettings

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from doorstate.clouds.preparation import SCALE_M
-from doorstate.simulation.manifest import write_csv
+from doorstate.files import write_csv
 from doorstate.types import Points
 
 Columns = dict[str, NDArray[np.float64]]

@@ -16,6 +16,7 @@ from doorstate.dataset.splits import (
     ONE_FOLD,
     PROTOCOLS,
     UNSEEN,
+    Role,
     draw_splits,
     read_splits,
     write_splits,
@@ -24,12 +25,13 @@ from doorstate.dataset.store import PreparedDataset, open_dataset
 from doorstate.errors import ConfigError, RunError
 from doorstate.jobs import Progress, default_workers, no_progress, run_pieces
 from doorstate.networks import create_network, list_networks, network_class
-from doorstate.networks.heads import PARTS, give_heads
+from doorstate.networks.heads import give_heads
 from doorstate.rules import create_rule
 from doorstate.training.fit import RunConfig, fit, threads
 from doorstate.training.recipes import Recipe, find_recipe
 from doorstate.training.rule_run import RuleRunConfig, answer
 from doorstate.training.run_folder import RunFolder, read_json, write_json
+from doorstate.types import PARTS
 
 
 class Experiment(BaseModel):
@@ -81,8 +83,8 @@ class Experiment(BaseModel):
             raise ConfigError(f"no protocol {self.protocol!r}: choose one of {', '.join(PROTOCOLS)}")
         if self.protocol in ONE_FOLD and self.folds != 1:
             raise ConfigError(f"experiment {self.name}: protocol {self.protocol} has one fold: set folds = 1")
-        if unknown := sorted(set(self.network_changes) - set(list_networks())):
-            raise ConfigError(f"experiment {self.name}: network_changes: no network {unknown[0]!r}")
+        for name in self.network_changes:
+            network_class(name)
         for network in self.networks:
             give_heads(create_network(network), self.heads_of(network))
             if self.recipe_of(network).epochs and self.protocol == UNSEEN:
@@ -199,7 +201,20 @@ def prepare_comparison(experiment: Experiment, folder: Path) -> None:
     splits_path = folder / "splits.csv"
     if not splits_path.is_file():
         write_splits(splits_path, draw_splits(dataset.rows, experiment.protocol, experiment.seed))
+    if experiment.start_from is not None:
+        _check_unseen(read_splits(splits_path), Path(experiment.start_from))
     write_json(path, settings)
+
+
+def _check_unseen(splits: Sequence[Mapping[str, Role]], start_from: Path) -> None:
+    """Raise RunError if weights to go on from have learned what is tested."""
+    for fold, (roles, before) in enumerate(zip(splits, read_splits(start_from / "splits.csv"), strict=False)):
+        for sample, role in roles.items():
+            if role == "test" and before.get(sample) in ("train", "val"):
+                raise RunError(
+                    f"{start_from}: fold {fold} has learned {sample}, which is tested here; "
+                    "use the seed and the protocol of that comparison"
+                )
 
 
 def train_one(

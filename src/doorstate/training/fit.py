@@ -33,7 +33,7 @@ from doorstate.errors import ConfigError, DatasetError, RunError, WeightsError
 from doorstate.files import atomic_path
 from doorstate.networks import create_network
 from doorstate.networks.base import PointNetwork
-from doorstate.networks.heads import PARTS, STATE, answers, give_heads, joint_losses
+from doorstate.networks.heads import STATE, answers, give_heads, joint_losses
 from doorstate.networks.layers import set_batchnorm
 from doorstate.training.answers import in_metres, write_answers
 from doorstate.training.card import WeightsCard
@@ -41,7 +41,7 @@ from doorstate.training.environment import bf16_is_quick, compiled, describe_env
 from doorstate.training.recipes import Recipe, batchnorm_momentum, learning_rate, resolution_of_epoch
 from doorstate.training.run_folder import RunFolder, write_predictions
 from doorstate.training.weights import load_into, read_card, save_weights
-from doorstate.types import NO_DOOR, STATES, Part
+from doorstate.types import NO_DOOR, PARTS, STATES, Part
 
 _ROLES: tuple[Role, ...] = ("train", "val", "test")
 _EVALUATION_BATCH = 32
@@ -203,7 +203,7 @@ class _Trainer:
         recipe, num_points = self.config.recipe, self.config.num_points
         full = resolution_of_epoch(recipe, recipe.epochs - 1, num_points)
         if recipe.epochs == 0:
-            save_weights(self.run.weights, self.network, self._card())
+            save_weights(self.run.weights, self.network, read_card(Path(str(self.config.start_from))))
         resolution = loader = validation = None
         for epoch in range(len(self.log), recipe.epochs):
             started = time.perf_counter()
@@ -335,7 +335,7 @@ class _Trainer:
         if not self.run.checkpoint.is_file():
             return
         try:
-            state = torch.load(self.run.checkpoint, map_location=self.fabric.device, weights_only=True)
+            state = torch.load(self.run.checkpoint, map_location="cpu", weights_only=True)
         except Exception as error:  # torch raises many kinds for a damaged file
             raise RunError(
                 f"{self.run.checkpoint}: cannot be read ({error}); delete the run's folder"

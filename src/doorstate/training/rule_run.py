@@ -16,13 +16,12 @@ from sklearn.metrics import accuracy_score, f1_score
 from doorstate.dataset.splits import Role
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import DatasetError
-from doorstate.files import write_text
+from doorstate.files import write_csv, write_text
 from doorstate.rules import create_rule
 from doorstate.rules.base import Answer
-from doorstate.simulation.manifest import write_csv
 from doorstate.training.environment import describe_environment
 from doorstate.training.run_folder import RunFolder
-from doorstate.types import NO_ANSWER, STATES
+from doorstate.types import NO_ANSWER, NO_DOOR, STATES
 
 _TELL_EVERY_S = 1.0
 
@@ -55,9 +54,13 @@ def answer(
     run.claim(config.model_dump(mode="json"), describe_environment())
     if run.finished:
         return run.read_metrics()
-    tested = [sample for sample, role in roles.items() if role == "test"]
+    tested = [
+        sample
+        for sample, role in roles.items()
+        if role == "test" and dataset.rows[dataset.index_of(sample)]["state"] != NO_DOOR
+    ]
     if not tested:
-        raise DatasetError(f"no sample is tested in fold {config.fold}")
+        raise DatasetError(f"no sample with a door is tested in fold {config.fold}")
     rule = create_rule(config.rule)
     started = told = time.perf_counter()
     rows, found, milliseconds = [], [], []

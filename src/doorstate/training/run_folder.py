@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from doorstate.errors import RunError
-from doorstate.files import write_text
-from doorstate.simulation.manifest import read_csv, write_csv
+from doorstate.files import read_csv, write_csv, write_text
 from doorstate.types import STATES
 
 _SINCE: dict[str, Any] = {"heads": []}  # of configurations: what older folders do not know

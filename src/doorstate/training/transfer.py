@@ -110,8 +110,8 @@ def _seen(comparison: str) -> set[str]:
 
 
 def _origin(row: Mapping[str, str]) -> str:
-    """What two samples may not share: the scene, whatever sensor it was seen with; without scenes the sample."""
-    return row.get("scene_id") or row["sample_id"]
+    """What two samples may not share: the scene, whatever sensor saw it; without scenes seed and name."""
+    return row.get("scene_id") or f"{row.get('seed', '')}/{row['sample_id']}"
 
 
 def _comparison(folder: str) -> dict[str, Any]:

@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Who answers: packaged weights, a file of weights or a rule, ready for the first cloud."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from doorstate.deployment.gate import Gate
+from doorstate.deployment.predictor import DEFAULT_GATE, DEFAULT_NETWORK, Predictor
+from doorstate.deployment.rule_predictor import RulePredictor
+from doorstate.errors import ConfigError
+from doorstate.training.environment import keep_freed_memory
+
+
+def load_predictor(
+    network: str = DEFAULT_NETWORK,
+    weights: Path | None = None,
+    rule: str | None = None,
+    points: int | None = None,
+    *,
+    budget_ms: float | None = None,
+    gate: Gate | None = DEFAULT_GATE,
+    threads: int | None = None,
+) -> Predictor | RulePredictor:
+    """Load and warm up.
+
+    Args:
+        network: whose packaged weights answer.
+        weights: a file in place of them.
+        rule: in place of a network.
+        points: as of `Predictor.load`, like what follows.
+        budget_ms: in place of points.
+        gate: refuses clouds in which too much is missing.
+        threads: for one answer.
+
+    Raises:
+        ConfigError: options that exclude each other, or no such rule.
+        WeightsError: no such weights, or they cannot be used.
+        MissingExtraError: what the weights need is not installed.
+    """
+    keep_freed_memory()
+    if rule is None:
+        predictor = Predictor.load(
+            weights or network, points, gate=gate, budget_ms=budget_ms, threads=threads
+        )
+        predictor.warm_up()
+        return predictor
+    if weights is not None or points is not None or budget_ms is not None:
+        raise ConfigError(
+            "a rule has no weights and looks at all points: leave weights, points and time budget out"
+        )
+    return RulePredictor.load(rule, gate=gate)
