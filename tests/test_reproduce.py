@@ -10,6 +10,8 @@ from types import ModuleType
 
 import pytest
 
+from doorstate.dataset.store import PreparedDataset
+from doorstate.training.comparison import compare, load_experiment
 from doorstate.training.run_folder import RunFolder
 
 REPOSITORY = Path(__file__).parents[1]
@@ -77,3 +79,32 @@ def test_folds_that_all_methods_have_finished_are_shown(reproduce: ModuleType, t
 def test_wrong_usage_shows_how(reproduce: ModuleType, arguments: list[str]) -> None:
     with pytest.raises(SystemExit, match=r"reproduce\.py run paper"):
         reproduce.main(arguments)
+
+
+def test_a_published_run_is_trained_again(
+    reproduce: ModuleType,
+    small_dataset: PreparedDataset,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    (tmp_path / "trial.toml").write_text(
+        f'dataset = "{small_dataset.folder}"\nnetworks = ["pointnet"]\nnum_points = 128\n'
+        '[recipe_changes]\nepochs = 1\nbatch_size = 8\nprecision = "fp32"\ncoarse_to_fine = []\n'
+    )
+    compare(load_experiment(tmp_path / "trial.toml", {}), tmp_path / "trial")
+    for name in ("RESULTS", "RUNS", "EXPERIMENTS"):
+        monkeypatch.setattr(reproduce, name, tmp_path)
+    assert reproduce.again("pointnet", 3, "trial") is None
+    assert "pointnet, fold 3: " in capsys.readouterr().out
+    published = RunFolder(tmp_path / "trial" / "runs" / "pointnet" / "fold3")
+    found = published.read_metrics()
+    spread = 2 / found["test_samples"]
+    for off, inside in ((0.9 * spread, True), (-5.0, False)):
+        published.finish(found | {"test_macro_f1": found["test_macro_f1"] + off})
+        for fold in (0, 1, 2, 4):  # as if all folds were alike, so that chance alone is allowed for
+            other = RunFolder(tmp_path / "trial" / "runs" / "pointnet" / f"fold{fold}")
+            other.finish(other.read_metrics() | {"test_macro_f1": found["test_macro_f1"] + off})
+        assert (reproduce.again("pointnet", 3, "trial") is None) is inside
+    published.metrics.unlink()
+    assert "not all folds of pointnet are published" in reproduce.again("pointnet", 3, "trial")

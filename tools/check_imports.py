@@ -11,7 +11,7 @@ PACKAGE = Path(__file__).resolve().parents[1] / "src" / "doorstate"
 # A module may import from its own line and the lines above.
 ORDER = (
     ("errors", "types", "__init__"),
-    ("files",),
+    ("files", "models"),
     ("jobs",),
     ("clouds",),
     ("simulation",),
@@ -24,7 +24,7 @@ ORDER = (
     ("console", "cli"),
 )
 # A network knows tensors only.
-FORBIDDEN = {"networks": {"clouds", "simulation", "dataset", "files", "jobs"}}
+FORBIDDEN = {"networks": {"clouds", "simulation", "dataset", "files", "models", "jobs"}}
 # The package's public names are looked up when they are asked for.
 LAZY = {"__init__"}
 

@@ -3,7 +3,8 @@
 
 python tools/package_weights.py runs/weights      # after `make reproduce EXPERIMENT=weights`
 
-How well the recipe does and how sure the answers are comes from the published cross-validation in results/.
+How well the recipe does and how sure the answers are comes from the published cross-validation in results/. What tells
+of the packaged weights elsewhere is to be made anew then: CONTRIBUTING.md, "Publishing".
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from results_page import NAMES
 from templates import template
 from zoo_page import PAGE, page
 
+from doorstate.clouds.augment import Augmentation
 from doorstate.evaluation.calibration import calibrate, reliability
 from doorstate.evaluation.metrics import scores
 from doorstate.evaluation.results import ComparisonResults, load_results
@@ -38,6 +40,7 @@ def main(folder: str) -> None:
     rows = RESULTS / "ogurob-4096"
     paper, by_pose = (load_results(RESULTS / name, rows) for name in ("paper", "by-pose"))
     model_card = template("model_card.md.j2")
+    unchanged = Augmentation().model_dump(mode="json")
     for name in read_json(Path(folder) / "comparison.json")["networks"]:
         run = run_of(Path(folder), name, 0)
         network, card = load_weights(run.weights)
@@ -47,12 +50,17 @@ def main(folder: str) -> None:
         temperature = round(median(calibrated.temperatures), 4)
         target = WEIGHTS / f"{name}.safetensors"
         save_weights(target, network, card.model_copy(update={"temperature": temperature}), half=True)
-        metrics = run.read_metrics()
+        metrics, recipe = run.read_metrics(), read_json(run.config)["recipe"]
         text = model_card.render(
             name=name,
             title=NAMES[name],
             parameters=sum(p.numel() for p in network.parameters()),
-            recipe=read_json(run.config)["recipe"],
+            recipe=recipe,
+            augmentation={
+                key.replace("_", " "): value
+                for key, value in recipe["augmentation"].items()
+                if value != unchanged[key]
+            },
             environment=read_json(run.environment),
             minutes=metrics["seconds"] / 60,
             samples=metrics["train_samples"],
