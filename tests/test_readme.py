@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import csv
 import re
 import shlex
 import shutil
@@ -45,6 +46,27 @@ def test_make_targets_exist() -> None:
         re.findall(r"^([\w-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), flags=re.MULTILINE)
     )
     assert wanted <= targets
+
+
+def test_the_results_are_the_published_ones() -> None:
+    shown = {
+        name.lower().replace("++", "2"): (f1, errors, ms)
+        for name, f1, errors, ms in re.findall(
+            r"^\| (\S+) \| ([\d.]+) \| (\d+) \| (\d+) \|$", README, flags=re.MULTILINE
+        )
+    }
+    with (ROOT / "results/paper/report/tables/summary.csv").open(encoding="utf-8") as file:
+        rows = {row["network"]: row for row in csv.DictReader(file)}
+    published = {name: (row["macro F1"], row["errors"]) for name, row in rows.items()}
+    assert {name: figures[:2] for name, figures in shown.items()} == published
+    (samples,) = {row["samples"] for row in rows.values()}
+    assert f"| errors of {samples} |" in README
+    latency = (ROOT / "docs/benchmarks/latency.md").read_text(encoding="utf-8")
+    for name, (_, _, ms) in shown.items():
+        (total,) = re.findall(
+            rf"^\| {name} \| torch \| 4096 \| 2 \|.* ([\d.]+) \([\d.]+\) \|$", latency, flags=re.MULTILINE
+        )
+        assert abs(float(total) - int(ms)) <= 0.5, name
 
 
 @pytest.mark.slow
