@@ -12,15 +12,14 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
+from doorstate.models import Frozen
 from doorstate.types import Points
 
 
-class Augmentation(BaseModel):
+class Augmentation(Frozen):
     """How far clouds are changed; every default changes nothing. Lengths are in units of the normalised cloud."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     yaw_deg: float = Field(default=0.0, ge=0, le=180)  # turned about z by U(-yaw, yaw)
     mirror: float = Field(default=0.0, ge=0, le=1)  # probability of y -> -y

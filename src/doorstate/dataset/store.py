@@ -12,11 +12,12 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import ValidationError
 
 from doorstate.dataset.sampled import sample_frame
 from doorstate.errors import ConfigError, DatasetError
 from doorstate.files import read_csv, write_text
+from doorstate.models import Frozen
 from doorstate.simulation.generate import replay
 from doorstate.simulation.manifest import unflatten
 from doorstate.simulation.shading import shade
@@ -26,10 +27,8 @@ MANIFEST, CLOUDS, PARTS, DESCRIPTION = "manifest.csv", "clouds.npy", "parts.npy"
 _LABELS = (*STATES, NO_DOOR)
 
 
-class DatasetDescription(BaseModel):
+class DatasetDescription(Frozen):
     """What a prepared folder holds."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     kind: Literal["simulated", "imported"]
     source: str

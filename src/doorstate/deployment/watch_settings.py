@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import ConfigDict, Field, ValidationError
 
 from doorstate.clouds.io import UNITS_M, ReadOptions
 from doorstate.clouds.messages import CLOUD, COMPRESSED_IMAGE, IMAGE
@@ -15,14 +15,15 @@ from doorstate.deployment.loading import load_predictor
 from doorstate.deployment.predictor import DEFAULT_GATE, DEFAULT_NETWORK, Predictor
 from doorstate.deployment.rule_predictor import RulePredictor
 from doorstate.errors import ConfigError
+from doorstate.models import Frozen
 
 MESSAGE_TYPES = {"cloud": CLOUD, "depth": IMAGE, "compressed_depth": COMPRESSED_IMAGE}  # by input
 
 
-class WatchSettings(BaseModel):
+class WatchSettings(Frozen):
     """Parameters of the node; the text of each is what `ros2 param describe` shows."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+    model_config = ConfigDict(strict=True, allow_inf_nan=False)
 
     input: Literal["cloud", "depth", "compressed_depth"] = Field(
         "cloud", description="What is read: PointCloud2, Image or CompressedImage."

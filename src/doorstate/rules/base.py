@@ -9,9 +9,9 @@ from typing import ClassVar, Generic, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict
 
 from doorstate.clouds.preparation import is_measured
+from doorstate.models import Frozen
 from doorstate.types import DoorState, Points
 
 
@@ -40,10 +40,8 @@ class Answer:
         return cls(None, reason, found=found)
 
 
-class Parameters(BaseModel):
+class Parameters(Frozen):
     """Base of every rule's parameters: frozen, named with units; a comment beside each says where it comes from."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
 
 P = TypeVar("P", bound=Parameters)

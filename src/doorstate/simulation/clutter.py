@@ -6,8 +6,7 @@ from __future__ import annotations
 import math
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict
-
+from doorstate.models import Frozen
 from doorstate.simulation.draws import Draws
 from doorstate.simulation.plan import collide, place
 from doorstate.simulation.rooms import Space
@@ -31,10 +30,8 @@ _LEG_M, _TOP_M = 0.04, 0.04
 _TRIES_AN_ITEM = 10
 
 
-class Item(BaseModel):
+class Item(Frozen):
     """One thing, where it stands in the door frame, and how large it is."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     kind: ItemKind
     x_m: float

@@ -10,8 +10,7 @@ from __future__ import annotations
 import math
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict
-
+from doorstate.models import Frozen
 from doorstate.simulation.handles import Handle, handle_boxes
 from doorstate.simulation.plan import collide, distance_m, mirror, place
 from doorstate.simulation.scene import Box, Door, frame_boxes, wall_boxes
@@ -52,10 +51,8 @@ class VariedDoor(Door):
         return self.kind == "sliding"
 
 
-class Opening(BaseModel):
+class Opening(Frozen):
     """How far a door is open: its active and passive leaves' angles or, if it slides, the share of its width."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     angle_deg: float = 0.0
     passive_angle_deg: float = 0.0

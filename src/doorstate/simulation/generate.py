@@ -8,9 +8,10 @@ import math
 from typing import Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, SerializerFunctionWrapHandler, model_serializer
+from pydantic import ConfigDict, Field, SerializerFunctionWrapHandler, model_serializer
 
 from doorstate.errors import ConfigError
+from doorstate.models import Frozen
 from doorstate.simulation.frames import Frame as Frame
 from doorstate.simulation.frames import level as level
 from doorstate.simulation.frames import looks_into, opening_depth_m, same_image, sensed_by
@@ -21,10 +22,8 @@ from doorstate.simulation.sensor import CameraPose, DepthCamera, cut_range
 from doorstate.types import DoorState, Part
 
 
-class Preset(BaseModel):
+class Preset(Frozen):
     """What a data set draws its scenes from; opening angles in degrees, one range per state."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     name: str
     angles_deg: dict[Literal["closed", "semi_open", "open"], tuple[float, float]]
@@ -56,13 +55,13 @@ PRESETS = {
 }
 
 
-class SampleRow(BaseModel):
+class SampleRow(Frozen):
     """One line of the manifest; scene and camera columns rebuild the frame, the others describe it.
 
     Poses are in the door frame (simulation.scene) but for `door_*`, which is the door frame in the sensor frame.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(allow_inf_nan=False)
 
     sample_id: str
     pose_id: str

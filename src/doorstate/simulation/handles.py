@@ -5,8 +5,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict
-
+from doorstate.models import Frozen
 from doorstate.simulation.draws import Draws
 from doorstate.simulation.scene import Box
 from doorstate.types import Part
@@ -17,10 +16,8 @@ _KNOB_M = 0.055
 _SHARES: dict[Literal["lever", "knob", "bar"], float] = {"lever": 0.6, "knob": 0.2, "bar": 0.2}
 
 
-class Handle(BaseModel):
+class Handle(Frozen):
     """A handle; `length_m` is that of a lever's or bar's grip."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     kind: Literal["lever", "knob", "bar"]
     height_m: float

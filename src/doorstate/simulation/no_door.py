@@ -5,8 +5,7 @@ from __future__ import annotations
 
 from typing import Literal, get_args
 
-from pydantic import BaseModel, ConfigDict
-
+from doorstate.models import Frozen
 from doorstate.simulation.draws import Draws
 from doorstate.simulation.scene import Box
 from doorstate.types import Part
@@ -20,10 +19,8 @@ _FRONT_M, _GAP_M, _PLINTH_M, _KNOB_M = 0.018, 0.003, 0.08, 0.025
 _CASEMENT_M, _PANE_M = 0.06, 0.02
 
 
-class Feature(BaseModel):
+class Feature(Frozen):
     """What is in, or before, a wall instead of a door; its middle is the origin of the door frame."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     kind: FeatureKind
     wall_thickness_m: float

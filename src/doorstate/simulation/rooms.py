@@ -3,8 +3,7 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict
-
+from doorstate.models import Frozen
 from doorstate.simulation.draws import Draws
 from doorstate.simulation.scene import Box
 from doorstate.types import Part
@@ -15,10 +14,8 @@ _BESIDE_M = 0.15  # from what is in the wall to a side wall, at least
 _AROUND_ROBOT_M = 0.45
 
 
-class Space(BaseModel):
+class Space(Frozen):
     """Distances from the middle of the door (or of what is there instead) to the inner faces; None is open."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     left_m: float | None = None
     right_m: float | None = None

@@ -10,8 +10,7 @@ from __future__ import annotations
 import math
 from typing import Literal, NamedTuple
 
-from pydantic import BaseModel, ConfigDict
-
+from doorstate.models import Frozen
 from doorstate.types import Part
 
 Hinge = Literal["left", "right"]
@@ -31,13 +30,11 @@ class Box(NamedTuple):
     material: Material = "matte"
 
 
-class Door(BaseModel):
+class Door(Frozen):
     """A single hinged door and the wall around it; sizes are those of SIMULATION section 4, all assumed.
 
     The authors state none of them. Opening 0.90 x 2.10 m, wall 0.15 m and leaf 0.04 m are usual in Turkey.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     opening_width_m: float = 0.90
     opening_height_m: float = 2.10

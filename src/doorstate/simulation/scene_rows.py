@@ -9,8 +9,9 @@ import math
 from collections.abc import Callable
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, field_serializer, field_validator
+from pydantic import ConfigDict, field_serializer, field_validator
 
+from doorstate.models import Frozen
 from doorstate.simulation.door_draws import state_of
 from doorstate.simulation.doors import Opening, passable_width_m
 from doorstate.simulation.draws import Draws
@@ -37,10 +38,8 @@ _DRAWS: dict[PresetName, Callable[[Draws], DrawnScene]] = {
 }
 
 
-class ScenePreset(BaseModel):
+class ScenePreset(Frozen):
     """What a data set of many scenes draws; the ranges are in the data card."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     name: PresetName
     camera: DepthCamera = DepthCamera()
@@ -49,7 +48,7 @@ class ScenePreset(BaseModel):
 SCENE_PRESETS = {name: ScenePreset(name=name) for name in _DRAWS}
 
 
-class SceneRow(BaseModel):
+class SceneRow(Frozen):
     """One line of the manifest of a preset of many scenes.
 
     `scene`, the opening, camera, sensor, seed and name rebuild the frame; the others describe it. Poses are in the door
@@ -57,7 +56,7 @@ class SceneRow(BaseModel):
     or a door that slides, does not have is empty.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(allow_inf_nan=False)
 
     sample_id: str
     pose_id: str

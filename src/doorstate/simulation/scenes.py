@@ -5,8 +5,9 @@ from __future__ import annotations
 
 from typing import Self
 
-from pydantic import BaseModel, ConfigDict, model_validator
+from pydantic import model_validator
 
+from doorstate.models import Frozen
 from doorstate.simulation.clutter import Item, item_boxes
 from doorstate.simulation.doors import Opening, VariedDoor, door_boxes
 from doorstate.simulation.no_door import Feature, feature_boxes
@@ -14,10 +15,8 @@ from doorstate.simulation.rooms import Space, ceiling_box, space_boxes
 from doorstate.simulation.scene import Box, floor_box
 
 
-class Scene(BaseModel):
+class Scene(Frozen):
     """Everything but the camera and how far the door is open."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     door: VariedDoor | None = None
     feature: Feature | None = None  # what is there instead of a door

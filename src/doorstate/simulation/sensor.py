@@ -15,9 +15,10 @@ from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, SerializerFunctionWrapHandler, model_serializer
+from pydantic import SerializerFunctionWrapHandler, model_serializer
 
 from doorstate.clouds.camera import Intrinsics
+from doorstate.models import Frozen
 from doorstate.simulation.scene import Box, Material
 from doorstate.types import DepthImage, Part
 
@@ -30,14 +31,12 @@ _EDGES = np.array(
 )
 
 
-class DepthCamera(BaseModel):
+class DepthCamera(Frozen):
     """A pinhole depth camera; the defaults are the ASUS Xtion Pro as Gazebo's `openni_kinect` plugin simulates it.
 
     Image 640x480, 60 degrees, valid strictly between 0.4 and 5.0 m (SIMULATION section 1.2). Pixels are square; the
     centre of projection is the image's, unless it is given.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     width: int = 640
     height: int = 480

@@ -6,9 +6,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from doorstate.errors import ConfigError
+from doorstate.models import Frozen
 from doorstate.simulation.frames import Frame
 from doorstate.simulation.generate import PRESETS, Preset, pose_indices, simulate_pose
 from doorstate.simulation.manifest import Row
@@ -20,10 +21,8 @@ RAW_KINDS: tuple[RawKind, ...] = ("pcd", "depth", "image")
 DEFAULT_SCENES = 1000
 
 
-class SimulationSettings(BaseModel):
+class SimulationSettings(Frozen):
     """One door, seen from the half-ring of poses or some of it."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     preset: Preset
     seed: int
@@ -40,10 +39,8 @@ class SimulationSettings(BaseModel):
         return simulate_pose(self.preset, self.seed, index, self.sensor)
 
 
-class SceneSettings(BaseModel):
+class SceneSettings(Frozen):
     """Many scenes, each seen from one pose."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     preset: ScenePreset
     seed: int

@@ -3,20 +3,19 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from doorstate import __version__
 from doorstate.clouds.preparation import SCALE_M
+from doorstate.models import Frozen
 from doorstate.types import STATES
 
 
-class WeightsCard(BaseModel):
+class WeightsCard(Frozen):
     """What a weights file says of itself."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
     network: str
-    network_options: dict[str, object] = {}
+    network_options: dict[str, object] = Field(default_factory=dict)
     num_points: int
     heads: tuple[str, ...] = ()  # answers besides the state
     scale_m: float = SCALE_M

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
 from doorstate.clouds.preparation import NUM_POINTS
 from doorstate.dataset.splits import (
@@ -24,6 +24,7 @@ from doorstate.dataset.splits import (
 from doorstate.dataset.store import PreparedDataset, open_dataset
 from doorstate.errors import ConfigError, RunError
 from doorstate.jobs import Progress, default_workers, no_progress, run_pieces
+from doorstate.models import Frozen
 from doorstate.networks import create_network, list_networks, network_class
 from doorstate.networks.heads import give_heads
 from doorstate.rules import create_rule
@@ -34,10 +35,8 @@ from doorstate.training.run_folder import RunFolder, read_json, write_json
 from doorstate.types import PARTS
 
 
-class Experiment(BaseModel):
+class Experiment(Frozen):
     """One flat experiment file; the same keys are options of `doorstate compare`."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     name: str
     dataset: str
@@ -48,8 +47,10 @@ class Experiment(BaseModel):
     num_points: int = Field(default=NUM_POINTS, ge=128)
     seed: int = 0
     recipe: str = "common"
-    recipe_changes: dict[str, Any] = {}  # fields of the recipe that differ
-    network_changes: dict[str, dict[str, Any]] = {}  # for one network, over recipe_changes
+    recipe_changes: dict[str, Any] = Field(default_factory=dict)  # fields of the recipe that differ
+    network_changes: dict[str, dict[str, Any]] = Field(
+        default_factory=dict
+    )  # for one network, over recipe_changes
     # A comparison whose weights of the same network and fold the runs go on from.
     start_from: str | None = None
     heads: tuple[str, ...] = ()  # answers besides the state, trained jointly

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import lightning_fabric
 import numpy as np
 import torch
-from pydantic import BaseModel, ConfigDict
+from pydantic import Field
 from sklearn.metrics import accuracy_score, f1_score
 from torch import Tensor
 from torch.nn import functional
@@ -31,6 +31,7 @@ from doorstate.dataset.store import PreparedDataset
 from doorstate.dataset.targets import NO_STATE
 from doorstate.errors import ConfigError, DatasetError, RunError, WeightsError
 from doorstate.files import atomic_path
+from doorstate.models import Frozen
 from doorstate.networks import create_network
 from doorstate.networks.base import PointNetwork
 from doorstate.networks.heads import STATE, answers, give_heads, joint_losses
@@ -49,13 +50,11 @@ _TELL_EVERY_S = 1.0
 _SAVE_EVERY_S = 180.0  # within an epoch, which can take a quarter of an hour
 
 
-class RunConfig(BaseModel):
+class RunConfig(Frozen):
     """What a run trains; kept in its folder, and a folder is continued only with the same."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
     network: str
-    network_options: dict[str, Any] = {}
+    network_options: dict[str, Any] = Field(default_factory=dict)
     dataset: str
     protocol: str
     fold: int

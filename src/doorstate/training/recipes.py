@@ -6,17 +6,16 @@ from __future__ import annotations
 import math
 from typing import Literal, NamedTuple
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from doorstate.clouds.augment import Augmentation
 from doorstate.clouds.preparation import NUM_POINTS
 from doorstate.errors import ConfigError
+from doorstate.models import Frozen
 
 
-class Stage(BaseModel):
+class Stage(Frozen):
     """A share of the epochs on less of each cloud; clouds are progressive, so that is a slice."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     share: float = Field(gt=0, le=1)
     points: int = Field(ge=128)
@@ -30,10 +29,8 @@ class Resolution(NamedTuple):
     centres: float
 
 
-class Recipe(BaseModel):
+class Recipe(Frozen):
     """Everything that decides how a network is trained but the data and the network."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     name: str
     epochs: int = Field(default=30, ge=0)  # 0 tests the weights that a run starts from

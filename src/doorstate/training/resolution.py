@@ -7,20 +7,19 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
 from doorstate.clouds.preparation import MIN_POINTS
 from doorstate.errors import ConfigError
+from doorstate.models import Frozen
 from doorstate.networks import list_networks
 from doorstate.training.comparison import Experiment, first_problem, read_toml
 
 AS_TRAINED, FINE_TUNED = "as-trained", "fine-tuned"
 
 
-class ResolutionStudy(BaseModel):
+class ResolutionStudy(Frozen):
     """One flat study file: which weights, on how many points."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     name: str
     dataset: str

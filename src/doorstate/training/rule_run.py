@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict
 from sklearn.metrics import accuracy_score, f1_score
 
 from doorstate.dataset.splits import Role
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import DatasetError
 from doorstate.files import write_csv, write_text
+from doorstate.models import Frozen
 from doorstate.rules import create_rule
 from doorstate.rules.base import Answer
 from doorstate.training.environment import describe_environment
@@ -26,10 +26,8 @@ from doorstate.types import NO_ANSWER, NO_DOOR, STATES
 _TELL_EVERY_S = 1.0
 
 
-class RuleRunConfig(BaseModel):
+class RuleRunConfig(Frozen):
     """What a run answers with; kept in its folder, and a folder is continued only with the same."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     rule: str
     parameters: dict[str, Any]

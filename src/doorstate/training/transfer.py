@@ -7,12 +7,13 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
 from doorstate.clouds.preparation import NUM_POINTS
 from doorstate.dataset.splits import UNSEEN, Role, read_splits, write_splits
 from doorstate.dataset.store import open_dataset
 from doorstate.errors import ConfigError, RunError
+from doorstate.models import Frozen
 from doorstate.networks import list_networks
 from doorstate.training.comparison import Experiment, first_problem, read_toml
 from doorstate.training.run_folder import read_json
@@ -33,10 +34,8 @@ class Cell(NamedTuple):
         return Path(self.trained, self.tested)
 
 
-class TransferStudy(BaseModel):
+class TransferStudy(Frozen):
     """One flat study file: finished comparisons by name, whose fold 0 is tested, and data sets by name."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     name: str
     trained: dict[_Name, str] = Field(min_length=1)

@@ -8,17 +8,16 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
+from doorstate.models import Frozen
 from doorstate.types import DepthImage
 
 _STEEPEST_RAD = np.float32(math.radians(85.0))  # chosen: the published term is infinite at 90 degrees
 
 
-class ConstantAxial(BaseModel):
+class ConstantAxial(Frozen):
     """The same everywhere."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     kind: Literal["constant"] = "constant"
     deviation_m: float = Field(ge=0)
@@ -30,14 +29,12 @@ class ConstantAxial(BaseModel):
         return np.full(depth_m.shape, self.deviation_m, np.float32)
 
 
-class NguyenAxial(BaseModel):
+class NguyenAxial(Frozen):
     """Kinect v1 as Nguyen, Izadi and Lovell 2012 measured it: s = a + b (z - c)^2, beyond 60 degrees with
     d / sqrt(z) t^2 / (pi / 2 - t)^2 at incidence t.
 
     They measured what the sensor gave, its steps of disparity and all.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     kind: Literal["nguyen"] = "nguyen"
     base_m: float = 0.0012
@@ -61,10 +58,8 @@ class NguyenAxial(BaseModel):
         return sigma
 
 
-class StereoAxial(BaseModel):
+class StereoAxial(Frozen):
     """Stereo of sub-pixel precision p: s = p z^2 / (f b), as Intel states it for RealSense cameras (SIMULATION 3.1)."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     kind: Literal["stereo"] = "stereo"
     baseline_m: float = Field(gt=0)

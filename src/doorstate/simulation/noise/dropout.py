@@ -7,24 +7,21 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
+from doorstate.models import Frozen
 from doorstate.types import DepthImage
 
 
-class Grazing(BaseModel):
+class Grazing(Frozen):
     """The share lost grows from 0 to 1 between two angles of incidence (SIMULATION section 3.2)."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     from_deg: float = 70.0
     to_deg: float = 90.0
 
 
-class Speckle(BaseModel):
+class Speckle(Frozen):
     """Squares that are lost at random, so that this share of all pixels is."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     share: float = Field(ge=0, lt=1)
     side_px: int = Field(ge=1)

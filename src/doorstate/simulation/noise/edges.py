@@ -5,15 +5,14 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
+from doorstate.models import Frozen
 from doorstate.types import DepthImage
 
 
-class Edges(BaseModel):
+class Edges(Frozen):
     """Shares of SIMULATION section 3.2."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     jump: float = Field(default=0.05, gt=0)  # of the nearer depth, to one of the four pixels around
     lost: float = Field(default=0.5, ge=0, le=1)

@@ -7,15 +7,14 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
+from doorstate.models import Frozen
 from doorstate.simulation.sensor import Render
 
 
-class Lateral(BaseModel):
+class Lateral(Frozen):
     """Standard deviation of Nguyen, Izadi and Lovell 2012: s = base + slope t / (pi / 2 - t) pixels at incidence t."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     base_px: float = Field(default=0.8, ge=0)
     slope_px: float = Field(default=0.035, ge=0)

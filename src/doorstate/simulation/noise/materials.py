@@ -7,18 +7,17 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from doorstate.clouds.camera import Intrinsics
+from doorstate.models import Frozen
 from doorstate.simulation.scene import Box
 from doorstate.simulation.sensor import CameraPose, Render, is_made_of, render
 from doorstate.types import DepthImage
 
 
-class Materials(BaseModel):
+class Materials(Frozen):
     """Shares of pixels lost, of SIMULATION section 3.2 but for what is marked as chosen."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     glass_lost: float = Field(default=0.7, ge=0, le=1)  # the others see what is behind the pane
     dark_lost: float = Field(default=0.3, ge=0, le=1)

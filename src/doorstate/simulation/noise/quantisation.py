@@ -4,15 +4,14 @@
 from __future__ import annotations
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
+from doorstate.models import Frozen
 from doorstate.types import DepthImage
 
 
-class DisparitySteps(BaseModel):
+class DisparitySteps(Frozen):
     """Disparity f b / z in whole steps; depth then has steps of about z^2 step / (f b)."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     baseline_m: float = Field(gt=0)
     step_px: float = Field(gt=0)
@@ -22,10 +21,8 @@ class DisparitySteps(BaseModel):
         return depth_m * depth_m * np.float32(self.step_px / (focal_px * self.baseline_m))
 
 
-class DepthSteps(BaseModel):
+class DepthSteps(Frozen):
     """Depth in whole steps, kept in a number of bits."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     step_m: float = Field(gt=0)
     bits: int = Field(ge=1)

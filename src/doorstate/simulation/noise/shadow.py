@@ -11,15 +11,14 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
+from doorstate.models import Frozen
 from doorstate.types import DepthImage
 
 
-class SecondView(BaseModel):
+class SecondView(Frozen):
     """Where the projector or second imager is."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     baseline_m: float = Field(gt=0)
     towards: Literal["right", "down"] = "right"  # from the camera, in the image
