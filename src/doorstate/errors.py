@@ -16,6 +16,13 @@ DoorstateError
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pydantic import ValidationError
+
+_LONGEST_REASON = 160  # letters
+
 
 class DoorstateError(Exception):
     """Root of the tree; `str(error)` is one line that says what was wrong, where, and what to do."""
@@ -63,3 +70,14 @@ class ExportError(DoorstateError):
 
 class MissingExtraError(DoorstateError):
     """An optional package is needed and not installed."""
+
+
+def first_problem(error: ValidationError) -> str:
+    """Where the first problem of values lies, if not in the whole, and what it is."""
+    problem = error.errors()[0]
+    return ": ".join(filter(None, [".".join(map(str, problem["loc"])), problem["msg"]]))
+
+
+def one_line(error: Exception) -> str:
+    """What another library says, in one line that is not long."""
+    return " ".join(f"{type(error).__name__}: {error}".split())[:_LONGEST_REASON]

@@ -26,7 +26,7 @@ from doorstate.clouds.messages import (
     points_from_message,
     stamp_ns_of,
 )
-from doorstate.errors import CameraError, CloudReadError, DoorstateError, MissingExtraError
+from doorstate.errors import CameraError, CloudReadError, DoorstateError, MissingExtraError, one_line
 from doorstate.types import Points
 
 _COMPRESSED_DEPTH = "/compressedDepth"  # how image_transport ends the names of such topics
@@ -195,7 +195,7 @@ class Bag:
         except DoorstateError as error:
             cloud = error
         except Exception as error:  # whatever rosbags and Pillow make of foreign bytes
-            cloud = CloudReadError(f"damaged message ({_reason(error)})")
+            cloud = CloudReadError(f"damaged message ({one_line(error)})")
         return StampedCloud(stamp_ns / 1e9, frame_id, cloud)
 
     def _converter(
@@ -238,8 +238,4 @@ def _one_line(path: Path, complaint: str) -> Iterator[None]:
     except DoorstateError:
         raise
     except Exception as error:
-        raise CloudReadError(f"{path.name}: {complaint} ({_reason(error)})") from error
-
-
-def _reason(error: Exception) -> str:
-    return " ".join(f"{type(error).__name__}: {error}".split())[:160]
+        raise CloudReadError(f"{path.name}: {complaint} ({one_line(error)})") from error

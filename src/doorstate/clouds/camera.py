@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, Self
 
 import yaml
 
-from doorstate.errors import CameraError
+from doorstate.errors import CameraError, one_line
 
 
 @dataclass(frozen=True)
@@ -90,8 +90,9 @@ def read_intrinsics(path: Path) -> Intrinsics:
     except OSError as error:
         raise CameraError(f"{path.name}: cannot be read ({error.strerror or error})") from error
     except Exception as error:  # whatever a parser makes of foreign bytes
-        reason = " ".join(str(error).split())[:120]
-        raise CameraError(f"{path.name}: not a JSON or YAML file with intrinsics ({reason})") from error
+        raise CameraError(
+            f"{path.name}: not a JSON or YAML file with intrinsics ({one_line(error)})"
+        ) from error
 
 
 def _from_mapping(entries: Any) -> Intrinsics:

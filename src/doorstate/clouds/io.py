@@ -21,7 +21,7 @@ from doorstate.clouds.pcd import parse_pcd
 from doorstate.clouds.ply import parse_ply
 from doorstate.clouds.png import parse_depth_png
 from doorstate.clouds.tables import parse_table
-from doorstate.errors import CameraError, CloudReadError, ConfigError, DoorstateError
+from doorstate.errors import CameraError, CloudReadError, ConfigError, DoorstateError, one_line
 from doorstate.types import Points
 
 _PARSERS: dict[str, Callable[[bytes], NDArray[Any]]] = {
@@ -158,8 +158,7 @@ def parse_cloud(data: bytes, suffix: str, options: ReadOptions = DEFAULT_OPTIONS
         raise
     except Exception as error:
         # Foreign bytes make parsing libraries raise anything; to the user it is one thing.
-        reason = " ".join(f"{type(error).__name__}: {error}".split())[:160]
-        raise CloudReadError(f"damaged, or no {suffix} file ({reason})") from error
+        raise CloudReadError(f"damaged, or no {suffix} file ({one_line(error)})") from error
 
 
 def check_suffix(suffix: str) -> None:

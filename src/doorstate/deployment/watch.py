@@ -26,7 +26,7 @@ from doorstate.deployment.predictor import Prediction, Predictor
 from doorstate.deployment.rule_predictor import RulePredictor
 from doorstate.deployment.stream import Filtered, Holding, StateFilter
 from doorstate.deployment.watch_settings import MESSAGE_TYPES, WatchSettings
-from doorstate.errors import CameraError, DoorstateError
+from doorstate.errors import CameraError, DoorstateError, one_line
 from doorstate.rules.base import Shape
 from doorstate.types import DoorState, Points
 
@@ -130,8 +130,7 @@ class DoorWatch:
         except DoorstateError as error:
             prediction = Prediction.none(str(error))
         except Exception as error:  # what libraries make of foreign bytes must not end a robot's node
-            said = " ".join(f"{type(error).__name__}: {error}".split())
-            prediction = Prediction.none(f"damaged message ({said[:160]})")
+            prediction = Prediction.none(f"damaged message ({one_line(error)})")
         stamp_s = stamp_ns / 1e9
         if prediction.state is not None:
             self._seen_s = stamp_s

@@ -16,7 +16,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from doorstate.dataset.splits import Role, read_splits
 from doorstate.dataset.store import MANIFEST
-from doorstate.errors import DatasetError, RunError
+from doorstate.errors import DatasetError, RunError, first_problem
 from doorstate.evaluation.found_shapes import Found, read_found
 from doorstate.evaluation.metrics import Floats
 from doorstate.files import read_csv
@@ -229,9 +229,7 @@ def _read_comparison(path: Path) -> Comparison:
     try:
         return TypeAdapter(Comparison).validate_python(read_json(path))
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
-        raise RunError(f"{path}: {where}: {first['msg']}; write the comparison again") from error
+        raise RunError(f"{path}: {first_problem(error)}; write the comparison again") from error
 
 
 def _find_dataset(comparison_folder: Path, dataset: str) -> Path:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from doorstate.errors import DatasetError
+from doorstate.errors import DatasetError, first_problem
 from doorstate.simulation.generate import SampleRow
 from doorstate.simulation.scene_rows import SceneRow
 
@@ -48,11 +48,8 @@ def unflatten(columns: Mapping[str, str]) -> Row:
     try:
         return model.model_validate(nested)
     except ValidationError as error:
-        problem = error.errors()[0]
-        column = ".".join(str(step) for step in problem["loc"])
-        raise DatasetError(
-            f"manifest line {columns.get('sample_id', '?')}, column {column}: {problem['msg']}"
-        ) from error
+        line = columns.get("sample_id", "?")
+        raise DatasetError(f"manifest line {line}, column {first_problem(error)}") from error
 
 
 def numbers(rows: Sequence[Mapping[str, str]], *names: str) -> NDArray[np.float64]:

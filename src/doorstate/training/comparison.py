@@ -22,7 +22,7 @@ from doorstate.dataset.splits import (
     write_splits,
 )
 from doorstate.dataset.store import PreparedDataset, open_dataset
-from doorstate.errors import ConfigError, RunError
+from doorstate.errors import ConfigError, RunError, first_problem
 from doorstate.jobs import Progress, default_workers, no_progress, run_pieces
 from doorstate.models import Frozen
 from doorstate.networks import create_network, list_networks, network_class
@@ -265,10 +265,3 @@ def _run_piece(piece: _Piece, path: Path) -> None:
     with threads(piece.threads):
         dataset = open_dataset(Path(piece.experiment.dataset))
         run(piece.experiment, path.parent, dataset, piece.network, piece.fold, piece.folder / "splits.csv")
-
-
-def first_problem(error: ValidationError) -> str:
-    """Where and what, in one line."""
-    problem = error.errors()[0]
-    where: Sequence[Any] = problem["loc"]
-    return f"{'.'.join(str(step) for step in where)}: {problem['msg']}"

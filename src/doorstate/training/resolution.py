@@ -10,10 +10,10 @@ from typing import Annotated, Any
 from pydantic import Field, ValidationError
 
 from doorstate.clouds.preparation import MIN_POINTS
-from doorstate.errors import ConfigError
+from doorstate.errors import ConfigError, first_problem
 from doorstate.models import Frozen
 from doorstate.networks import list_networks
-from doorstate.training.comparison import Experiment, first_problem, read_toml
+from doorstate.training.comparison import Experiment, read_toml
 
 AS_TRAINED, FINE_TUNED = "as-trained", "fine-tuned"
 

@@ -12,10 +12,10 @@ from pydantic import Field, ValidationError
 from doorstate.clouds.preparation import NUM_POINTS
 from doorstate.dataset.splits import UNSEEN, Role, read_splits, write_splits
 from doorstate.dataset.store import open_dataset
-from doorstate.errors import ConfigError, RunError
+from doorstate.errors import ConfigError, RunError, first_problem
 from doorstate.models import Frozen
 from doorstate.networks import list_networks
-from doorstate.training.comparison import Experiment, first_problem, read_toml
+from doorstate.training.comparison import Experiment, read_toml
 from doorstate.training.run_folder import read_json
 
 _Name = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9-]*$")]
