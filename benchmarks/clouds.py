@@ -15,7 +15,8 @@ from doorstate.dataset.splits import draw_splits
 from doorstate.dataset.store import PreparedDataset, open_dataset
 from doorstate.errors import ConfigError
 from doorstate.jobs import Progress
-from doorstate.simulation.generate import PRESETS, Frame, SampleRow, draw_pose, pose_indices, replay
+from doorstate.simulation.frames import Frame, replay
+from doorstate.simulation.generate import PRESETS, SampleRow, draw_pose, pose_indices
 from doorstate.simulation.manifest import unflatten
 from doorstate.types import STATES, Points
 

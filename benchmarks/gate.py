@@ -15,7 +15,7 @@ from doorstate.deployment.predictor import Predictor
 from doorstate.errors import CloudContentError
 from doorstate.evaluation.table import Table
 from doorstate.jobs import Progress
-from doorstate.simulation.generate import Frame, replay
+from doorstate.simulation.frames import Frame, replay
 from doorstate.simulation.manifest import unflatten
 from doorstate.types import STATES, Part, Points
 

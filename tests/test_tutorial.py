@@ -19,7 +19,8 @@ pytest.importorskip("rosbags")
 from doorstate.clouds.io import read_cloud
 from doorstate.clouds.pcd import write_pcd
 from doorstate.simulation.generate import PRESETS
-from doorstate.simulation.run import SimulationSettings, simulate_dataset
+from doorstate.simulation.run import simulate_dataset
+from doorstate.simulation.settings import SimulationSettings
 
 ROOT = Path(__file__).resolve().parents[1]
 TUTORIAL = (ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8")

@@ -21,7 +21,8 @@ from doorstate.clouds.camera import Intrinsics
 from doorstate.clouds.depth import depth_to_points
 from doorstate.clouds.preparation import prepare_cloud
 from doorstate.clouds.sampling import bucket_farthest_points, farthest_point_indices
-from doorstate.simulation.generate import PRESETS, draw_pose, replay
+from doorstate.simulation.frames import replay
+from doorstate.simulation.generate import PRESETS, draw_pose
 from doorstate.types import Indices, Points
 
 GAZEBO = Path(__file__).resolve().parents[1] / "fixtures" / "gazebo"

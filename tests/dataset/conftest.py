@@ -11,8 +11,9 @@ import pytest
 from doorstate.dataset.store import CLOUDS, MANIFEST, DatasetDescription
 from doorstate.files import write_csv
 from doorstate.simulation.generate import PRESETS
-from doorstate.simulation.run import SimulationSettings, simulate_dataset
+from doorstate.simulation.run import simulate_dataset
 from doorstate.simulation.sensor import DepthCamera
+from doorstate.simulation.settings import SimulationSettings
 from doorstate.types import STATES
 
 

@@ -18,7 +18,7 @@ from doorstate.dataset.store import CLOUDS, DESCRIPTION, MANIFEST, PARTS, open_d
 from doorstate.dataset.strata import distance_band, region
 from doorstate.errors import ConfigError, DatasetError
 from doorstate.files import read_csv, write_csv
-from doorstate.simulation.generate import replay
+from doorstate.simulation.frames import replay
 from doorstate.simulation.manifest import unflatten
 from doorstate.types import STATES, Part
 

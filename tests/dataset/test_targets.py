@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 from doorstate.clouds.augment import Augmentation, apply_augmentation, draw_augmentation
 from doorstate.clouds.preparation import SCALE_M
 from doorstate.dataset.targets import Targets, augmented, door_targets, known_parts
-from doorstate.simulation.generate import draw_pose, find_preset
+from doorstate.simulation.generate import PRESETS, draw_pose
 from doorstate.simulation.manifest import flatten
 
 ROW = {
@@ -48,7 +48,7 @@ def test_targets_are_in_the_units_of_the_normalised_cloud() -> None:
 
 
 def test_rows_of_the_first_preset_have_all_but_the_passable_width() -> None:
-    row = flatten(draw_pose(find_preset("ogurob"), 3, 700)[1])
+    row = flatten(draw_pose(PRESETS["ogurob"], 3, 700)[1])
     found = door_targets([row], np.zeros((1, 3), dtype=np.float32))
     assert found["hinge"][0, 0] == 1
     assert found["widths"][0, 0] * SCALE_M == pytest.approx(0.9)

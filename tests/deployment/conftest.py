@@ -14,7 +14,8 @@ from doorstate.deployment.sightings import Sighting
 from doorstate.deployment.view import look
 from doorstate.errors import CloudReadError
 from doorstate.networks import create_network
-from doorstate.simulation.generate import Frame, draw_pose, find_preset, replay
+from doorstate.simulation.frames import Frame, replay
+from doorstate.simulation.generate import PRESETS, draw_pose
 from doorstate.training.weights import WeightsCard
 from doorstate.types import STATES
 
@@ -33,7 +34,7 @@ def viewer() -> Predictor:
 @pytest.fixture(scope="module")
 def frames() -> list[Frame]:
     """A closed, a semi-open and an open door from one place."""
-    return [replay(row) for row in draw_pose(find_preset("ogurob"), 3, 700)]
+    return [replay(row) for row in draw_pose(PRESETS["ogurob"], 3, 700)]
 
 
 @pytest.fixture(scope="module")

@@ -16,7 +16,7 @@ from doorstate.deployment.frame_page import choose_frames
 from doorstate.deployment.predictor import Predictor
 from doorstate.deployment.rule_predictor import RulePredictor
 from doorstate.errors import CloudReadError, ConfigError
-from doorstate.simulation.generate import Frame
+from doorstate.simulation.frames import Frame
 from doorstate.types import NO_ANSWER, STATES, Points
 
 

@@ -15,7 +15,7 @@ from doorstate.clouds.io import ReadOptions, read_cloud
 from doorstate.dataset.store import PreparedDataset
 from doorstate.deployment.gate import Gate
 from doorstate.deployment.predictor import Predictor
-from doorstate.simulation.generate import replay
+from doorstate.simulation.frames import replay
 from doorstate.simulation.manifest import unflatten
 from doorstate.types import Points
 

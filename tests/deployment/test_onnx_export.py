@@ -57,12 +57,12 @@ def test_the_file_answers_as_torch_does(name: str, clouds: LabelledClouds, tmp_p
     assert comparison.largest <= TOLERANCE == comparison.allowed
     assert comparison.right == comparison.right_in_torch
     exported = OnnxNetwork(path)
-    expected = TorchNetwork(network, 0.1).probabilities(clouds.points)
+    expected = TorchNetwork(network, 0.1).ask(clouds.points)[0]
     assert np.ptp(expected, axis=0).max() > 0.1, "answers that are all alike compare nothing"
     for batch in (clouds.points[:1], clouds.points[1:6]):
-        found = exported.probabilities(batch)
+        found = exported.ask(batch)[0]
         np.testing.assert_allclose(found.sum(1), 1, atol=1e-5)
-    np.testing.assert_allclose(exported.probabilities(clouds.points), expected, atol=TOLERANCE)
+    np.testing.assert_allclose(exported.ask(clouds.points)[0], expected, atol=TOLERANCE)
 
     model = onnx.load(path)
     onnx.checker.check_model(model, full_check=True)
@@ -92,7 +92,7 @@ def test_heads_are_outputs_of_the_file(clouds: LabelledClouds, tmp_path: Path) -
     for name, values in expected.items():
         assert np.ptp(values) > 0 or name.endswith("width_m")  # widths are cut at 0
         np.testing.assert_allclose(columns[name], values, atol=0.01 if name.endswith("_deg") else 1e-4)
-    assert np.array_equal(probabilities, exported.probabilities(clouds.points))
+    assert np.array_equal(probabilities, exported.ask(clouds.points)[0])
     outputs = [each.name for each in onnx.load(tmp_path / "network.onnx").graph.output]
     assert outputs == ["probabilities", *HEADS]
 

@@ -21,7 +21,7 @@ from doorstate.deployment.onnx_network import OnnxNetwork
 from doorstate.deployment.predictor import Predictor
 from doorstate.errors import CloudContentError, ConfigError, MissingExtraError, WeightsError
 from doorstate.networks import create_network
-from doorstate.simulation.generate import replay
+from doorstate.simulation.frames import replay
 from doorstate.simulation.manifest import unflatten
 from doorstate.training.weights import WeightsCard, save_weights
 from doorstate.types import Points

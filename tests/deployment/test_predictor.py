@@ -19,7 +19,7 @@ from doorstate.errors import CloudContentError, ConfigError, WeightsError
 from doorstate.networks import create_network
 from doorstate.networks.base import PointNetwork
 from doorstate.networks.heads import HEADS, answers, give_heads
-from doorstate.simulation.generate import replay
+from doorstate.simulation.frames import replay
 from doorstate.simulation.manifest import unflatten
 from doorstate.training.answers import in_metres
 from doorstate.training.weights import WeightsCard, save_weights

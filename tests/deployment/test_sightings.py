@@ -20,7 +20,7 @@ from doorstate.deployment.sightings import (
     watch_folder,
 )
 from doorstate.errors import CloudReadError, DatasetError
-from doorstate.simulation.generate import replay
+from doorstate.simulation.frames import replay
 from doorstate.simulation.manifest import unflatten
 from doorstate.types import Part
 

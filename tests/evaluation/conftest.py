@@ -15,7 +15,7 @@ from doorstate.dataset.splits import draw_splits, read_splits, write_splits
 from doorstate.dataset.store import CLOUDS, MANIFEST, PARTS, DatasetDescription, PreparedDataset, open_dataset
 from doorstate.dataset.strata import distance_band, region
 from doorstate.files import write_csv
-from doorstate.simulation.generate import draw_pose, find_preset, pose_indices
+from doorstate.simulation.generate import PRESETS, draw_pose, pose_indices
 from doorstate.simulation.manifest import flatten
 from doorstate.types import STATES, Part
 
@@ -45,7 +45,7 @@ def simulated(tmp_path_factory: pytest.TempPathFactory) -> PreparedDataset:
     """40 poses of the simulator, never rendered; the semi-open and open frames of the first are called equal."""
     rows = []
     for index in pose_indices(POSES):
-        for sample in draw_pose(find_preset("ogurob"), 7, index):
+        for sample in draw_pose(PRESETS["ogurob"], 7, index):
             strata = {
                 "distance_band": distance_band(sample.distance_m),
                 "region": region(sample.robot_angle_deg),

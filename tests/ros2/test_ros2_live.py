@@ -30,7 +30,8 @@ from visualization_msgs.msg import Marker, MarkerArray
 from doorstate.clouds.depth import points_from_optical
 from doorstate.deployment.predictor import Predictor
 from doorstate.deployment.watch_settings import WatchSettings
-from doorstate.simulation.generate import draw_pose, find_preset, replay
+from doorstate.simulation.frames import replay
+from doorstate.simulation.generate import PRESETS, draw_pose
 from doorstate.types import Points
 
 PACKAGE = Path(__file__).resolve().parents[2] / "ros2" / "doorstate_ros"
@@ -140,7 +141,7 @@ def start(*arguments: str) -> subprocess.Popen[str]:
 @pytest.fixture(scope="module")
 def clouds() -> list[Points]:
     """Closed, semi-open, open, and nothing measured."""
-    small = [replay(row).points[::STEP, ::STEP] for row in draw_pose(find_preset("ogurob"), 3, 700)]
+    small = [replay(row).points[::STEP, ::STEP] for row in draw_pose(PRESETS["ogurob"], 3, 700)]
     return [*small, np.full_like(small[0], np.nan)]
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from doorstate.clouds.depth import depth_to_points
 from doorstate.rules.wall_leaf_angle import WallLeafAngleRule
-from doorstate.simulation.generate import level
+from doorstate.simulation.frames import level
 from doorstate.simulation.sensor import CAMERAS
 from doorstate.types import DoorState
 

@@ -15,17 +15,8 @@ from numpy.typing import NDArray
 from doorstate.clouds.depth import depth_to_points
 from doorstate.errors import ConfigError
 from doorstate.files import read_csv, write_csv
-from doorstate.simulation.generate import (
-    PRESETS,
-    Preset,
-    SampleRow,
-    draw_pose,
-    find_preset,
-    level,
-    pose_indices,
-    replay,
-    simulate_pose,
-)
+from doorstate.simulation.frames import level, replay
+from doorstate.simulation.generate import PRESETS, Preset, SampleRow, draw_pose, pose_indices, simulate_pose
 from doorstate.simulation.manifest import flatten, unflatten
 from doorstate.simulation.placement import half_ring
 from doorstate.simulation.scene import Box, build_scene
@@ -208,10 +199,7 @@ def test_a_door_that_opens_towards_the_robot_always_shows_its_state(index: int) 
     ]
 
 
-def test_presets_and_poses_are_found_or_refused_in_one_line() -> None:
-    assert find_preset("ogurob") is OGUROB
-    with pytest.raises(ConfigError, match=r"^no preset 'ogurop': choose one of ogurob, .*$"):
-        find_preset("ogurop")
+def test_poses_are_found_or_refused_in_one_line() -> None:
     assert pose_indices(None) == list(range(1353))
     assert len(pose_indices(7)) == 7
     for poses in (0, 1354):

@@ -15,24 +15,20 @@ from PIL import Image
 
 from doorstate.clouds.io import ReadOptions, read_cloud
 from doorstate.errors import ConfigError, DatasetError
-from doorstate.simulation.generate import PRESETS, pose_indices, replay
+from doorstate.simulation.frames import replay
+from doorstate.simulation.generate import PRESETS, pose_indices
 from doorstate.simulation.manifest import unflatten
-from doorstate.simulation.run import (
-    MANIFEST,
-    RAW_KINDS,
-    SimulationSettings,
-    is_simulated,
-    read_settings,
-    simulate_dataset,
-)
+from doorstate.simulation.run import MANIFEST, is_simulated, read_settings, simulate_dataset
 from doorstate.simulation.sensor import DepthCamera
+from doorstate.simulation.settings import RAW_KINDS, SimulationSettings
 from doorstate.types import STATES
 
 SCRIPT = """
 import sys
 from pathlib import Path
 
-from doorstate.simulation.run import SimulationSettings, simulate_dataset
+from doorstate.simulation.settings import SimulationSettings
+from doorstate.simulation.run import simulate_dataset
 
 if __name__ == "__main__":
     settings = SimulationSettings.model_validate_json(Path(sys.argv[2]).read_text(encoding="utf-8"))

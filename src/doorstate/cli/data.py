@@ -67,8 +67,8 @@ def simulate(
     from doorstate.dataset.strata import BANDS, REGIONS, distance_band, region
     from doorstate.jobs import Shard
     from doorstate.simulation.generate import PRESETS
-    from doorstate.simulation.run import RAW_KINDS, simulate_dataset, simulate_shard
-    from doorstate.simulation.settings import settings_for
+    from doorstate.simulation.run import simulate_dataset, simulate_shard
+    from doorstate.simulation.settings import RAW_KINDS, settings_for
 
     unknown = [kind for kind in keep or [] if kind not in RAW_KINDS]
     if unknown:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from doorstate.clouds.preparation import prepare_cloud
 from doorstate.errors import CloudContentError
-from doorstate.simulation.generate import Frame
+from doorstate.simulation.frames import Frame
 from doorstate.types import Points
 
 

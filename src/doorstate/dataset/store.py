@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from doorstate.dataset.sampled import sample_frame
-from doorstate.errors import ConfigError, DatasetError
+from doorstate.errors import ConfigError, DatasetError, first_problem
 from doorstate.files import read_csv, write_text
 from doorstate.models import Frozen
-from doorstate.simulation.generate import replay
+from doorstate.simulation.frames import replay
 from doorstate.simulation.manifest import unflatten
 from doorstate.simulation.shading import shade
 from doorstate.types import NO_DOOR, STATES, Indices, Points
@@ -178,7 +178,7 @@ def open_dataset(folder: Path) -> PreparedDataset:
         parts_path = folder / PARTS
         parts = np.load(parts_path, mmap_mode="r", allow_pickle=False) if parts_path.is_file() else None
     except ValidationError as error:
-        raise DatasetError(f"{path}: {error.errors()[0]['msg']}") from error
+        raise DatasetError(f"{path}: {first_problem(error)}") from error
     except (OSError, ValueError, EOFError) as error:
         raise DatasetError(f"{folder}: damaged ({error}); delete it and prepare it again") from error
     rows = read_csv(folder / MANIFEST)

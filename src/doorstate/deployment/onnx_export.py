@@ -21,12 +21,13 @@ from doorstate import __version__
 from doorstate.clouds.preparation import SCALE_M, prepare_cloud
 from doorstate.deployment.onnx_network import CARD, INPUT, OUTPUT, OnnxNetwork, heads_told
 from doorstate.deployment.torch_network import TorchNetwork
-from doorstate.errors import ConfigError, ExportError, MissingExtraError
+from doorstate.errors import ConfigError, ExportError, MissingExtraError, one_line
 from doorstate.files import atomic_path
 from doorstate.jobs import Progress, no_progress
 from doorstate.networks.base import PointNetwork
 from doorstate.networks.heads import STATE, answers
-from doorstate.simulation.generate import PRESETS, draw_pose, pose_indices, replay
+from doorstate.simulation.frames import replay
+from doorstate.simulation.generate import PRESETS, draw_pose, pose_indices
 from doorstate.training.answers import Columns
 from doorstate.training.card import WeightsCard
 from doorstate.types import STATES, Points
@@ -136,9 +137,8 @@ def export_onnx(
                 model.producer_name, model.producer_version = "doorstate", __version__
                 onnx.checker.check_model(model, full_check=True)
             except Exception as error:  # two compilers, which raise whatever they come across
-                reason = " ".join(str(error).split())[:160]
                 raise ExportError(
-                    f"{card.network} cannot be exported with opset {opset}: {reason}"
+                    f"{card.network} cannot be exported with opset {opset}: {one_line(error)}"
                 ) from error
         onnx.save(model, temporary)
         comparison = compare_with_torch(temporary, network, card, clouds, progress)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from doorstate.clouds.preparation import centroids
-from doorstate.errors import CloudContentError, MissingExtraError, WeightsError
+from doorstate.errors import CloudContentError, MissingExtraError, WeightsError, one_line
 from doorstate.training.answers import Columns, in_metres
 from doorstate.training.card import WeightsCard
 from doorstate.types import PARTS, STATES, Points
@@ -54,8 +54,7 @@ class OnnxNetwork:
         try:
             self._session = onnxruntime.InferenceSession(path, options, providers=["CPUExecutionProvider"])
         except Exception as error:  # onnxruntime's errors have no common class of their own
-            reason = " ".join(str(error).split())[:160]
-            raise WeightsError(f"{path}: cannot be read as ONNX ({reason})") from error
+            raise WeightsError(f"{path}: cannot be read as ONNX ({one_line(error)})") from error
         try:
             self.card = WeightsCard.model_validate_json(
                 self._session.get_modelmeta().custom_metadata_map[CARD]
@@ -68,12 +67,8 @@ class OnnxNetwork:
             raise WeightsError(f"{path}: made for states {self.card.states}")
         self._heads = heads_told(self.card)
 
-    def probabilities(self, points: Points) -> NDArray[np.float32]:
-        """(B, 3) probabilities of (B, n, 3) metres in farthest-point order; errors as of `ask`."""
-        return self.ask(points)[0]
-
     def ask(self, points: Points) -> tuple[NDArray[np.float32], Columns]:
-        """As `probabilities`, and what further heads say, (B,) each.
+        """Probabilities (B, 3), and what further heads say, (B,) each, of (B, n, 3) metres in farthest-point order.
 
         Raises:
             CloudContentError: n is not the number of points that the file takes.

@@ -18,7 +18,7 @@ from doorstate.clouds.io import DEFAULT_OPTIONS, ReadOptions, find_clouds, read_
 from doorstate.dataset.store import DESCRIPTION, PreparedDataset, open_dataset
 from doorstate.errors import CloudReadError, DatasetError, DoorstateError
 from doorstate.files import read_csv
-from doorstate.simulation.generate import replay
+from doorstate.simulation.frames import replay
 from doorstate.simulation.manifest import unflatten
 from doorstate.simulation.run import MANIFEST, is_simulated
 from doorstate.types import Points

@@ -26,14 +26,15 @@ class TorchNetwork:
         self.network = network.eval()
         self.temperature = temperature
 
-    def probabilities(self, points: Points) -> NDArray[np.float32]:
-        """(B, 3) probabilities of (B, n, 3) metres in farthest-point order."""
-        return self.ask(points)[0]
-
     def ask(
         self, points: Points, kind: type[np.floating] = np.float32
     ) -> tuple[NDArray[np.float32], Columns]:
-        """As `probabilities`, and what further heads say, (B,) each; in the number type of the network's weights."""
+        """Probabilities (B, 3), and what further heads say, (B,) each, of (B, n, 3) metres in farthest-point order.
+
+        Args:
+            points: the clouds.
+            kind: the number type of the network's weights.
+        """
         with torch.inference_mode():
             said = answers(self.network, torch.from_numpy(normalize(points).astype(kind)), parts=False)
             calibrated: NDArray[np.float32] = (said.pop(STATE) / self.temperature).softmax(1).numpy()

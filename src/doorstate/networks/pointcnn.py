@@ -20,7 +20,7 @@ from doorstate.networks.search import knn
 
 
 class Level(NamedTuple):
-    """One row of the original's table `modelnet_x3_l4`."""
+    """One X-Conv of the network."""
 
     k: int
     dilation: int
@@ -28,7 +28,8 @@ class Level(NamedTuple):
     channels: int
 
 
-LEVELS = (Level(8, 1, None, 48), Level(12, 2, 384, 96), Level(16, 2, 128, 192), Level(16, 3, 128, 384))
+# K and channels of the original's table `modelnet_x3_l4`; its D and P are the defaults of `PointCNN`.
+_LEVELS = ((8, 48), (12, 96), (16, 192), (16, 384))
 _MOST_VALUES_AT_ONCE = (
     2048  # of one neighbourhood; the first three levels have 192, 720 and 1920, the last 3840
 )
@@ -169,9 +170,8 @@ class PointCNN(PointNetwork):
         super().__init__()
         self.levels = nn.ModuleList()
         num_features = 0
-        for level, dilation, count in zip(LEVELS, dilations, num_representatives, strict=True):
-            level = level._replace(dilation=dilation, num_representatives=count)
-            conv = XConv(level, num_features, with_global=len(self.levels) == 3)
+        for (k, channels), dilation, count in zip(_LEVELS, dilations, num_representatives, strict=True):
+            conv = XConv(Level(k, dilation, count, channels), num_features, with_global=len(self.levels) == 3)
             self.levels.append(conv)
             num_features = conv.out_channels
         self.dense = nn.Sequential(
@@ -200,7 +200,6 @@ class PointCNN(PointNetwork):
 
     def point_features(self, points: Tensor, neighbourhoods: Neighbourhoods | None = None) -> Tensor:
         """(B, P, 192) features of the representative points of the last level."""
-        self.check(points)
         features = None
         known = neighbourhoods or self.neighbourhoods(points)
         for level, indices in zip(self.levels, known, strict=True):

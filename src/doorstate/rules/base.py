@@ -56,7 +56,6 @@ class Rule(ABC, Generic[P]):
 
     name: ClassVar[str]
     source: ClassVar[str]  # whose method it reconstructs
-    needs_image: ClassVar[bool] = False  # takes organized (H, W, 3) clouds only
     defaults: ClassVar[type[Parameters]]
 
     def __init__(self, parameters: P | None = None) -> None:
@@ -69,6 +68,13 @@ class Rule(ABC, Generic[P]):
         Args:
             cloud: (N, 3), or organized (H, W, 3), metres, x forward, y left, z up, NaN where nothing was measured.
         """
+
+
+def state_by_angle(angle_deg: float, closed_below_deg: float, open_above_deg: float) -> DoorState:
+    """State of a leaf by its angle against the wall; at a limit it is semi-open."""
+    if angle_deg < closed_below_deg:
+        return DoorState.CLOSED
+    return DoorState.OPEN if angle_deg > open_above_deg else DoorState.SEMI_OPEN
 
 
 def measured(cloud: Points) -> NDArray[np.float64]:

@@ -87,7 +87,6 @@ class OpenDoorRule(Rule[OpenDoorParameters]):
     defaults = OpenDoorParameters
     name = "open_door"
     source = "Kaleci & Turgut 2020 (a reconstruction from what is known, not the authors' code)"
-    needs_image = True
 
     def __call__(self, cloud: Points) -> Answer:
         if cloud.ndim != 3:

@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-GRID_M = 0.1
 HEADING_JITTER_DEG = 20.0  # both jambs in view in 96 % of the frames (SIMULATION section 1.4)
 _INNER_CELLS, _OUTER_CELLS = 15, 35  # 1.5 and 3.5 m
 _WALL_CELLS = 6  # 0.6 m off the wall

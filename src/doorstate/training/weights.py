@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import torch
@@ -45,7 +44,7 @@ def read_card(path: Path) -> WeightsCard:
         return WeightsCard.model_validate_json(metadata["doorstate"])
     except (OSError, SafetensorError) as error:
         raise WeightsError(f"{path}: cannot be read as safetensors ({error})") from error
-    except (KeyError, ValidationError, json.JSONDecodeError) as error:
+    except (KeyError, ValidationError) as error:
         raise WeightsError(
             f"{path}: does not say which network it is for: no weights of doorstate"
         ) from error
