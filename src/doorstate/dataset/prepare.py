@@ -31,7 +31,7 @@ from doorstate.dataset.strata import distance_band, region
 from doorstate.errors import CameraError, CloudError, ConfigError, DatasetError
 from doorstate.files import atomic_path, is_vacant, read_csv, write_csv, write_text
 from doorstate.jobs import Progress, Shard, default_workers, no_progress, piece_paths, run_pieces
-from doorstate.simulation.generate import replay
+from doorstate.simulation.frames import depth_sha256, replay
 from doorstate.simulation.manifest import unflatten
 from doorstate.simulation.run import MANIFEST as SIMULATED_MANIFEST
 from doorstate.simulation.run import is_simulated, read_settings
@@ -49,13 +49,45 @@ class PreparationSummary(NamedTuple):
     rejected: list[dict[str, str]]  # sample_id, file, reason
 
 
-class _Piece(NamedTuple):
-    rows: list[dict[str, str]]
+class _Preparation(NamedTuple):
+    """What is prepared, and how."""
+
     source: Path
     num_points: int
-    simulated: bool
+    poses_csv: Path | None
     options: ReadOptions
     layout: str | None
+
+    @property
+    def simulated(self) -> bool:
+        return self.layout is None and is_simulated(self.source)
+
+    def rows(self) -> list[dict[str, str]]:
+        if self.layout is not None:
+            return find_layout(self.layout).rows(self.source)
+        if not self.simulated:
+            return labelled_rows(self.source, self.poses_csv)
+        if self.poses_csv is not None or self.options != ReadOptions():
+            raise ConfigError(
+                f"{self.source}: is simulated and knows its poses and its camera: leave their options out"
+            )
+        return _simulated_rows(self.source)
+
+    def to_json(self, rows: Sequence[dict[str, str]]) -> str:
+        """What a folder is claimed with; folders begun by older versions hold the same."""
+        settings = {
+            "source": str(self.source.resolve()),
+            "num_points": self.num_points,
+            "options": repr(self.options),
+            "rows": hashlib.sha256(json.dumps(rows).encode()).hexdigest(),
+            **({} if self.layout is None else {"layout": self.layout}),
+        }
+        return json.dumps(settings, indent=2) + "\n"
+
+
+class _Piece(NamedTuple):
+    asked: _Preparation
+    rows: list[dict[str, str]]
 
 
 def prepare_dataset(
@@ -77,19 +109,19 @@ def prepare_dataset(
         ConfigError: `folder` holds something prepared from another source or with other settings.
         DatasetError: nothing to prepare, or nothing could be prepared.
     """
-    pieces, paths = _plan(source, folder, num_points, poses_csv, options, layout)
+    asked = _Preparation(source, num_points, poses_csv, options or ReadOptions(), layout)
+    pieces, paths = _plan(asked, folder)
     if (folder / DESCRIPTION).exists():
         shutil.rmtree(folder / _SCRATCH, ignore_errors=True)
         progress(1, 1)
         rejected = read_csv(folder / REJECTED) if (folder / REJECTED).exists() else []
         return PreparationSummary(open_dataset(folder), rejected)
     run_pieces(_prepare_piece, pieces, paths, workers or default_workers(), progress)
-    simulated = any(piece.simulated for piece in pieces)
     rows = [row for piece in pieces for row in piece.rows]
-    rejected = _assemble(folder, rows, paths, num_points, simulated)
-    name = read_settings(source).preset.name if simulated else source.resolve().name
+    rejected = _assemble(folder, asked, rows, paths)
+    name = read_settings(source).preset.name if asked.simulated else source.resolve().name
     DatasetDescription(
-        kind="simulated" if simulated else "imported",
+        kind="simulated" if asked.simulated else "imported",
         source=name,
         num_points=num_points,
         samples=len(rows) - len(rejected),
@@ -116,44 +148,20 @@ def prepare_shard(
         ConfigError: `folder` holds something prepared from another source or with other settings.
         DatasetError: nothing to prepare.
     """
-    pieces, paths = _plan(source, folder, num_points, poses_csv, options, layout)
+    asked = _Preparation(source, num_points, poses_csv, options or ReadOptions(), layout)
+    pieces, paths = _plan(asked, folder)
     if (folder / DESCRIPTION).exists():
         progress(1, 1)
         return
     run_pieces(_prepare_piece, shard.of(pieces), shard.of(paths), workers or default_workers(), progress)
 
 
-def _plan(
-    source: Path,
-    folder: Path,
-    num_points: int,
-    poses_csv: Path | None,
-    options: ReadOptions | None,
-    layout: str | None,
-) -> tuple[list[_Piece], list[Path]]:
+def _plan(asked: _Preparation, folder: Path) -> tuple[list[_Piece], list[Path]]:
     """Claim the folder, and say what is to be done and where it goes."""
-    options = options or ReadOptions()
-    simulated = layout is None and is_simulated(source)
-    if simulated and (poses_csv is not None or options != ReadOptions()):
-        raise ConfigError(
-            f"{source}: is simulated and knows its poses and its camera: leave their options out"
-        )
-    if layout is not None:
-        rows = find_layout(layout).rows(source)
-    else:
-        rows = _simulated_rows(source) if simulated else labelled_rows(source, poses_csv)
-    _claim(
-        folder,
-        {
-            "source": str(source.resolve()),
-            "num_points": num_points,
-            "options": repr(options),
-            "rows": _digest(rows),
-            **({} if layout is None else {"layout": layout}),
-        },
-    )
+    rows = asked.rows()
+    _claim(folder, asked.to_json(rows))
     pieces = [
-        _Piece(rows[start : start + _SAMPLES_PER_PIECE], source, num_points, simulated, options, layout)
+        _Piece(asked, rows[start : start + _SAMPLES_PER_PIECE])
         for start in range(0, len(rows), _SAMPLES_PER_PIECE)
     ]
     return pieces, piece_paths(folder / _SCRATCH, len(pieces), ".npz")
@@ -174,13 +182,8 @@ def _simulated_rows(source: Path) -> list[dict[str, str]]:
     return rows
 
 
-def _digest(rows: Sequence[dict[str, str]]) -> str:
-    return hashlib.sha256(json.dumps(rows).encode()).hexdigest()
-
-
-def _claim(folder: Path, settings: dict[str, object]) -> None:
+def _claim(folder: Path, text: str) -> None:
     path = folder / "preparation.json"
-    text = json.dumps(settings, indent=2) + "\n"
     if is_vacant(folder):
         write_text(path, text)
     elif not path.is_file():
@@ -191,17 +194,19 @@ def _claim(folder: Path, settings: dict[str, object]) -> None:
 
 
 def _prepare_piece(piece: _Piece, path: Path) -> None:
-    read = read_cloud if piece.layout is None else find_layout(piece.layout).read
+    asked = piece.asked
+    read = read_cloud if asked.layout is None else find_layout(asked.layout).read
+    simulated = asked.simulated
     clouds: list[Points] = []
     parts: list[np.ndarray] = []
     reasons: list[str] = []
     for row in piece.rows:
         try:
-            if piece.simulated:
-                cloud, part = _from_simulation(row, piece.num_points)
+            if simulated:
+                cloud, part = _from_simulation(row, asked.num_points)
                 parts.append(part)
             else:
-                cloud = exactly(read(piece.source / row["file"], piece.options), piece.num_points)[0]
+                cloud = exactly(read(asked.source / row["file"], asked.options), asked.num_points)[0]
             clouds.append(cloud)
             reasons.append("")
         except (CloudError, CameraError) as error:
@@ -209,8 +214,8 @@ def _prepare_piece(piece: _Piece, path: Path) -> None:
     with atomic_path(path) as temporary:
         np.savez(
             temporary,
-            clouds=np.array(clouds, dtype=np.float32).reshape(-1, piece.num_points, 3),
-            parts=np.array(parts, dtype=np.uint8).reshape(-1, piece.num_points),
+            clouds=np.array(clouds, dtype=np.float32).reshape(-1, asked.num_points, 3),
+            parts=np.array(parts, dtype=np.uint8).reshape(-1, asked.num_points),
             reasons=np.array(reasons, dtype=str),
         )
 
@@ -218,7 +223,7 @@ def _prepare_piece(piece: _Piece, path: Path) -> None:
 def _from_simulation(row: dict[str, str], num_points: int) -> tuple[Points, np.ndarray]:
     sample = unflatten(row)
     frame = replay(sample)
-    if hashlib.sha256(frame.cut.depth_m.tobytes()).hexdigest() != sample.depth_sha256:
+    if depth_sha256(frame) != sample.depth_sha256:
         raise DatasetError(
             f"{sample.sample_id}: renders differently than its manifest says; simulate it again here"
         )
@@ -226,7 +231,7 @@ def _from_simulation(row: dict[str, str], num_points: int) -> tuple[Points, np.n
 
 
 def _assemble(
-    folder: Path, rows: list[dict[str, str]], paths: list[Path], num_points: int, simulated: bool
+    folder: Path, asked: _Preparation, rows: list[dict[str, str]], paths: list[Path]
 ) -> list[dict[str, str]]:
     reasons: list[str] = []
     for path in paths:
@@ -244,9 +249,9 @@ def _assemble(
         raise DatasetError(
             f"none of the {len(rows)} clouds could be prepared; the first: {rejected[0]['reason']}"
         )
-    _concatenate(folder / CLOUDS, paths, "clouds", (len(kept), num_points, 3), np.float32)
-    if simulated:
-        _concatenate(folder / PARTS, paths, "parts", (len(kept), num_points), np.uint8)
+    _concatenate(folder / CLOUDS, paths, "clouds", (len(kept), asked.num_points, 3), np.float32)
+    if asked.simulated:
+        _concatenate(folder / PARTS, paths, "parts", (len(kept), asked.num_points), np.uint8)
     write_csv(folder / MANIFEST, kept)
     return rejected
 

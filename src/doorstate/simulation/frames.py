@@ -3,23 +3,23 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
-from typing import NamedTuple, Protocol, TypeVar
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple, Protocol, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel
 
 from doorstate.clouds.camera import Intrinsics
 from doorstate.clouds.depth import depth_to_points
 from doorstate.simulation.noise.models import apply, find_sensor
 from doorstate.simulation.noise.streams import sample_seed
 from doorstate.simulation.scene import Box
-from doorstate.simulation.sensor import CameraPose, DepthCamera, Render, render_behind_glass
-from doorstate.types import DepthImage, Points
+from doorstate.simulation.sensor import CameraPose, DepthCamera, Render, cut_range, render_behind_glass
+from doorstate.types import DepthImage, Part, Points
 
 SAME_IMAGE_M = 1e-4
-AnyRow = TypeVar("AnyRow", bound=BaseModel)
 
 
 class Sample(Protocol):
@@ -28,6 +28,10 @@ class Sample(Protocol):
     @property
     def sample_id(self) -> str:
         """Its name."""
+
+    @property
+    def state(self) -> str:
+        """Its label."""
 
     @property
     def seed(self) -> int:
@@ -46,6 +50,12 @@ class Sample(Protocol):
 
     def boxes(self) -> list[Box]:
         """What it looks at."""
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """The row with other values."""
+
+
+AnyRow = TypeVar("AnyRow", bound=Sample)
 
 
 class Frame(NamedTuple):
@@ -74,6 +84,72 @@ def sensed_by(row: AnyRow, sensor: str) -> AnyRow:
     """
     camera = find_sensor(sensor).camera
     return row.model_copy(update={"sensor": sensor} | ({} if camera == DepthCamera() else {"camera": camera}))
+
+
+def simulate(
+    rows: Sequence[AnyRow], sensor: str, opening_size_m: tuple[float, float] | None
+) -> tuple[list[AnyRow], list[Frame]]:
+    """Render samples that differ in how far the door is open alone, and fill in what can be seen of it.
+
+    Args:
+        rows: drawn and not yet rendered.
+        sensor: what measures.
+        opening_size_m: width and height; None without a door.
+
+    Raises:
+        ConfigError: no such sensor.
+    """
+    rows = [sensed_by(row, sensor) for row in rows]
+    frames = [replay(row) for row in rows]
+    opening_m = None
+    if opening_size_m is not None:
+        opening_m = opening_depth_m(rows[0].camera_pose(), rows[0].camera.intrinsics(), *opening_size_m)
+    # Two states that are the same but for a sensor's noise are still the same.
+    clean = [cut_range(frame.full, row.camera).depth_m for row, frame in zip(rows, frames, strict=True)]
+    filled = []
+    for row, frame, depth_m in zip(rows, frames, clean, strict=True):
+        twins = [
+            other.state
+            for other, other_m in zip(rows, clean, strict=True)
+            if other.state != row.state and same_image(depth_m, other_m)
+        ]
+        seen: dict[str, object] = {
+            "measured_px": int((frame.cut.part != Part.NONE).sum()),
+            "same_image_as": " ".join(dict.fromkeys(twins)),
+            "depth_sha256": depth_sha256(frame),
+        }
+        if opening_m is not None:
+            seen |= {
+                "visible_leaf_px": int((frame.cut.part == Part.LEAF).sum()),
+                "visible_frame_px": int((frame.cut.part == Part.FRAME).sum()),
+                "visible_opening_px": int(looks_into(frame.full.depth_m, opening_m).sum()),
+            }
+        filled.append(row.model_copy(update=seen))
+    return filled, frames
+
+
+def depth_sha256(frame: Frame) -> str:
+    """Of the depth image, so that a row can tell whether it renders as it did."""
+    return hashlib.sha256(frame.cut.depth_m.tobytes()).hexdigest()
+
+
+def door_place(x_m: float, y_m: float, z_m: float, heading_rad: float) -> dict[str, Any]:
+    """The door frame in the sensor frame, as columns of a manifest.
+
+    Args:
+        x_m: of the camera in the door frame.
+        y_m: likewise.
+        z_m: likewise.
+        heading_rad: where the camera looks, in the door frame.
+    """
+    cos, sin = math.cos(heading_rad), math.sin(heading_rad)
+    # The camera's own frame has the door at R(-heading) (door - camera).
+    return {
+        "door_x_m": -x_m * cos - y_m * sin,
+        "door_y_m": x_m * sin - y_m * cos,
+        "door_z_m": -z_m,
+        "door_yaw_deg": math.degrees(math.remainder(-heading_rad, 2 * math.pi)),
+    }
 
 
 def level(points: Points, pitch_rad: float, roll_rad: float = 0.0) -> Points:

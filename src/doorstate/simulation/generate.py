@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 from typing import Any, Literal
 
@@ -12,32 +11,32 @@ from pydantic import ConfigDict, Field, SerializerFunctionWrapHandler, model_ser
 
 from doorstate.errors import ConfigError
 from doorstate.models import Frozen
-from doorstate.simulation.frames import Frame as Frame
-from doorstate.simulation.frames import level as level
-from doorstate.simulation.frames import looks_into, opening_depth_m, same_image, sensed_by
-from doorstate.simulation.frames import replay as replay
+from doorstate.simulation.door_draws import ANGLES_DEG
+from doorstate.simulation.frames import Frame, door_place, simulate
 from doorstate.simulation.placement import draw_heading_rad, half_ring, reduced_ring
 from doorstate.simulation.scene import Box, Door, build_scene
-from doorstate.simulation.sensor import CameraPose, DepthCamera, cut_range
-from doorstate.types import DoorState, Part
+from doorstate.simulation.sensor import CameraPose, DepthCamera
+from doorstate.types import DoorState
+
+_State = Literal["closed", "semi_open", "open"]
 
 
 class Preset(Frozen):
     """What a data set draws its scenes from; opening angles in degrees, one range per state."""
 
     name: str
-    angles_deg: dict[Literal["closed", "semi_open", "open"], tuple[float, float]]
+    angles_deg: dict[_State, tuple[float, float]]
     door: Door
     camera: DepthCamera = DepthCamera()
     camera_height_m: float = Field(default=1.0, gt=0.0, lt=2.5)
 
 
-_RANGES: dict[Literal["closed", "semi_open", "open"], tuple[float, float]] = {
-    "closed": (0.0, 3.0),
-    "semi_open": (15.0, 65.0),
-    "open": (75.0, 115.0),
+_RANGES: dict[_State, tuple[float, float]] = {
+    "closed": ANGLES_DEG[DoorState.CLOSED],
+    "semi_open": ANGLES_DEG[DoorState.SEMI_OPEN],
+    "open": ANGLES_DEG[DoorState.OPEN],
 }
-_FIXED: dict[Literal["closed", "semi_open", "open"], tuple[float, float]] = {
+_FIXED: dict[_State, tuple[float, float]] = {
     "closed": (0.0, 0.0),
     "semi_open": (45.0, 45.0),
     "open": (90.0, 90.0),
@@ -65,7 +64,7 @@ class SampleRow(Frozen):
 
     sample_id: str
     pose_id: str
-    state: Literal["closed", "semi_open", "open"]
+    state: _State
     opening_angle_deg: float
     x_m: float
     y_m: float
@@ -111,9 +110,6 @@ def draw_pose(preset: Preset, seed: int, index: int) -> list[SampleRow]:
     """
     position = half_ring()[index]
     heading_rad = draw_heading_rad(position, seed, index)
-    # The camera's own frame has the door at R(-heading) (door - camera).
-    door_x = -position.x_m * math.cos(heading_rad) - position.y_m * math.sin(heading_rad)
-    door_y = position.x_m * math.sin(heading_rad) - position.y_m * math.cos(heading_rad)
     rows = []
     for state in DoorState:
         low, high = preset.angles_deg[state.label]  # type: ignore[index]
@@ -134,10 +130,7 @@ def draw_pose(preset: Preset, seed: int, index: int) -> list[SampleRow]:
                 camera=preset.camera,
                 distance_m=round(math.hypot(position.x_m, position.y_m), 9),
                 robot_angle_deg=round(math.degrees(math.atan2(position.row, position.column)), 9),
-                door_x_m=door_x,
-                door_y_m=door_y,
-                door_z_m=-preset.camera_height_m,
-                door_yaw_deg=math.degrees(math.remainder(-heading_rad, 2 * math.pi)),
+                **door_place(position.x_m, position.y_m, preset.camera_height_m, heading_rad),
             )
         )
     return rows
@@ -147,33 +140,8 @@ def simulate_pose(
     preset: Preset, seed: int, index: int, sensor: str = "none"
 ) -> tuple[list[SampleRow], list[Frame]]:
     """Draw and render the three samples of one pose and fill in what can be seen of the door."""
-    rows = [sensed_by(row, sensor) for row in draw_pose(preset, seed, index)]
-    frames = [replay(row) for row in rows]
-    size = preset.door.opening_width_m, preset.door.opening_height_m
-    opening_m = opening_depth_m(rows[0].camera_pose(), rows[0].camera.intrinsics(), *size)
-    # Two states that are the same but for a sensor's noise are still the same.
-    clean = [cut_range(frame.full, row.camera).depth_m for row, frame in zip(rows, frames, strict=True)]
-    filled = []
-    for row, frame, depth_m in zip(rows, frames, clean, strict=True):
-        twins = [
-            other.state
-            for other, other_m in zip(rows, clean, strict=True)
-            if other.state != row.state and same_image(depth_m, other_m)
-        ]
-        part = frame.cut.part
-        filled.append(
-            row.model_copy(
-                update={
-                    "measured_px": int((part != Part.NONE).sum()),
-                    "visible_leaf_px": int((part == Part.LEAF).sum()),
-                    "visible_frame_px": int((part == Part.FRAME).sum()),
-                    "visible_opening_px": int(looks_into(frame.full.depth_m, opening_m).sum()),
-                    "same_image_as": " ".join(twins),
-                    "depth_sha256": hashlib.sha256(frame.cut.depth_m.tobytes()).hexdigest(),
-                }
-            )
-        )
-    return filled, frames
+    size_m = preset.door.opening_width_m, preset.door.opening_height_m
+    return simulate(draw_pose(preset, seed, index), sensor, size_m)
 
 
 def pose_indices(poses: int | None) -> list[int]:
@@ -188,14 +156,3 @@ def pose_indices(poses: int | None) -> list[int]:
         return reduced_ring(poses)
     except ValueError as error:
         raise ConfigError(f"--poses {poses}: {error}") from error
-
-
-def find_preset(name: str) -> Preset:
-    """A preset by name.
-
-    Raises:
-        ConfigError: no such preset.
-    """
-    if name not in PRESETS:
-        raise ConfigError(f"no preset {name!r}: choose one of {', '.join(PRESETS)}")
-    return PRESETS[name]

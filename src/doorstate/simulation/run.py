@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A whole simulated data set on disk: `simulation.json`, `manifest.csv`, and raw files where they are asked for.
 
-The manifest is the data set: a row rebuilds its cloud (generate.replay). Raw clouds, depth and pictures are for other
+The manifest is the data set: a row rebuilds its cloud (frames.replay). Raw clouds, depth and pictures are for other
 people's tools.
 """
 
@@ -18,14 +18,12 @@ from PIL import Image
 from pydantic import TypeAdapter, ValidationError
 
 from doorstate.clouds.pcd import write_pcd
-from doorstate.errors import ConfigError, DatasetError
+from doorstate.errors import ConfigError, DatasetError, first_problem
 from doorstate.files import atomic_path, is_vacant, read_csv, write_csv, write_text
 from doorstate.jobs import Progress, Shard, default_workers, no_progress, piece_paths, run_pieces
 from doorstate.simulation.frames import Frame
 from doorstate.simulation.manifest import Row, flatten
-from doorstate.simulation.settings import RAW_KINDS as RAW_KINDS
 from doorstate.simulation.settings import RawKind, Settings
-from doorstate.simulation.settings import SimulationSettings as SimulationSettings
 from doorstate.simulation.shading import shade
 
 MANIFEST = "manifest.csv"
@@ -102,7 +100,7 @@ def read_settings(folder: Path) -> Settings:
     except (OSError, UnicodeDecodeError) as error:
         raise DatasetError(f"{folder}: holds no {_SETTINGS}; make one with 'doorstate simulate'") from error
     except ValidationError as error:
-        raise DatasetError(f"{path}: {error.errors()[0]['msg']}") from error
+        raise DatasetError(f"{path}: {first_problem(error)}") from error
 
 
 def is_simulated(folder: Path) -> bool:

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 from collections.abc import Callable
@@ -15,7 +14,7 @@ from doorstate.models import Frozen
 from doorstate.simulation.door_draws import state_of
 from doorstate.simulation.doors import Opening, passable_width_m
 from doorstate.simulation.draws import Draws
-from doorstate.simulation.frames import Frame, looks_into, opening_depth_m, replay, same_image, sensed_by
+from doorstate.simulation.frames import Frame, door_place, simulate
 from doorstate.simulation.occlusion import DoorView, occluded_bin
 from doorstate.simulation.scene import Box
 from doorstate.simulation.scene_draws import (
@@ -26,8 +25,8 @@ from doorstate.simulation.scene_draws import (
     draw_varied_angles,
 )
 from doorstate.simulation.scenes import Scene, clutter_boxes, scene_boxes
-from doorstate.simulation.sensor import CameraPose, DepthCamera, cut_range
-from doorstate.types import NO_DOOR, DepthImage, Part
+from doorstate.simulation.sensor import CameraPose, DepthCamera
+from doorstate.types import NO_DOOR
 
 PresetName = Literal["varied", "varied-angles", "cluttered", "no-door"]
 _DRAWS: dict[PresetName, Callable[[Draws], DrawnScene]] = {
@@ -169,7 +168,6 @@ def _of_opening(row: SceneRow, opening: Opening, name: str | None) -> dict[str, 
     door = row.scene.door
     assert door is not None
     state, ambiguous = state_of(door, opening)
-    heading = math.radians(row.heading_deg)
     return {
         "sample_id": f"{row.scene_id}-{name or state.label}",
         "state": state.label,
@@ -183,11 +181,7 @@ def _of_opening(row: SceneRow, opening: Opening, name: str | None) -> dict[str, 
         "opening_width_m": door.opening_width_m,
         "opening_height_m": door.opening_height_m,
         "passable_width_m": round(passable_width_m(door, opening), 4),
-        # The camera's own frame has the door at R(-heading) (door - camera).
-        "door_x_m": -row.x_m * math.cos(heading) - row.y_m * math.sin(heading),
-        "door_y_m": row.x_m * math.sin(heading) - row.y_m * math.cos(heading),
-        "door_z_m": -row.camera_height_m,
-        "door_yaw_deg": math.degrees(math.remainder(-heading, 2 * math.pi)),
+        **door_place(row.x_m, row.y_m, row.camera_height_m, math.radians(row.heading_deg)),
     }
 
 
@@ -195,47 +189,20 @@ def simulate_scene(
     preset: ScenePreset, seed: int, index: int, sensor: str = "none"
 ) -> tuple[list[SceneRow], list[Frame]]:
     """Draw and render the samples of one scene and fill in what can be seen of its door."""
-    rows = [sensed_by(row, sensor) for row in draw_scene(preset, seed, index)]
-    frames = [replay(row) for row in rows]
-    opening_m = _opening_m(rows[0])
-    # Two states that are the same but for a sensor's noise are still the same.
-    clean = [cut_range(frame.full, row.camera).depth_m for row, frame in zip(rows, frames, strict=True)]
-    filled = []
-    for row, frame, depth_m in zip(rows, frames, clean, strict=True):
-        twins = {
-            other.state
-            for other, other_m in zip(rows, clean, strict=True)
-            if other.state != row.state and same_image(depth_m, other_m)
-        }
-        described = _of_frame(row, frame, opening_m) | {"same_image_as": " ".join(sorted(twins))}
-        filled.append(row.model_copy(update=described))
-    return filled, frames
+    rows = draw_scene(preset, seed, index)
+    door = rows[0].scene.door
+    filled, frames = simulate(
+        rows, sensor, None if door is None else (door.opening_width_m, door.opening_height_m)
+    )
+    return [row.model_copy(update=_of_scene(row)) for row in filled], frames
 
 
-def _opening_m(row: SceneRow) -> DepthImage | None:
-    door = row.scene.door
-    if door is None:
-        return None
-    size = door.opening_width_m, door.opening_height_m
-    return opening_depth_m(row.camera_pose(), row.camera.intrinsics(), *size)
-
-
-def _of_frame(row: SceneRow, frame: Frame, opening_m: DepthImage | None) -> dict[str, object]:
-    part = frame.cut.part
-    found: dict[str, object] = {
-        "measured_px": int((part != Part.NONE).sum()),
-        "depth_sha256": hashlib.sha256(frame.cut.depth_m.tobytes()).hexdigest(),
-    }
-    if opening_m is None:
+def _of_scene(row: SceneRow) -> dict[str, object]:
+    found: dict[str, object] = {"same_image_as": " ".join(sorted(row.same_image_as.split()))}
+    if row.scene.door is None:
         return found
     share = 0.0
     if row.scene.items:
         view = DoorView(row.scene, row.opening(), row.camera_pose(), row.camera)
         share = view.occluded_share(clutter_boxes(row.scene))
-    return found | {
-        "visible_leaf_px": int((part == Part.LEAF).sum()),
-        "visible_frame_px": int((part == Part.FRAME).sum()),
-        "visible_opening_px": int(looks_into(frame.full.depth_m, opening_m).sum()),
-        "occluded_share": share,
-        "occluded_bin": occluded_bin(share),
-    }
+    return found | {"occluded_share": share, "occluded_bin": occluded_bin(share)}
