@@ -10,12 +10,14 @@ python tools/reproduce.py check                # the same into a scratch folder:
 
 from __future__ import annotations
 
+import multiprocessing
 import shlex
 import shutil
 import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 REPOSITORY = Path(__file__).resolve().parents[1]
@@ -113,11 +115,13 @@ def build(root: Path) -> None:
     """Write everything that follows from the committed predictions below `root`."""
     from results_page import write_pages
 
-    from doorstate.evaluation.report import write_everything
     from doorstate.evaluation.resolution import write_resolution
+    from doorstate.jobs import default_workers
 
-    for folders, folds in _comparisons():
-        write_everything(folders, root / "results" / folders[-1].name / "report", ROWS, folds)
+    # spawn: a forked child of a process that runs BLAS threads can hang.
+    with ProcessPoolExecutor(default_workers(), multiprocessing.get_context("spawn")) as pool:
+        for report in [pool.submit(_report, root, *each) for each in _comparisons()]:
+            report.result()
     if (RESULTS / "resolution").is_dir():
         write_resolution(RESULTS / "resolution", root / "results" / "resolution" / "report", ROWS)
     write_pages(RESULTS, ROWS, root / "results", *(root / page for page in PAGES))
@@ -146,6 +150,12 @@ def check() -> str | None:
         return "\n".join([*lines, "python tools/reproduce.py build writes them anew"])
     print(f"{len(made)} files follow from the committed predictions, byte for byte")
     return None
+
+
+def _report(root: Path, folders: list[Path], folds: int) -> None:
+    from doorstate.evaluation.report import write_everything
+
+    write_everything(folders, root / "results" / folders[-1].name / "report", ROWS, folds)
 
 
 def _comparisons() -> Iterator[tuple[list[Path], int]]:
