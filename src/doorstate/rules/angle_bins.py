@@ -7,11 +7,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from doorstate.rules.base import Answer, Parameters, Rule
+from doorstate.rules.base import Answer, Parameters, Rule, state_by_angle
 from doorstate.rules.plan_lines import Floats, angle_deg
 from doorstate.rules.planes import Plane, pieces, thin, upright_plane
 from doorstate.rules.walls import WallParameters, covered_m, nearby, off_floor, outline, wall_alone
-from doorstate.types import DoorState, Points
+from doorstate.types import Points
 
 
 class AngleBinsParameters(Parameters):
@@ -63,7 +63,8 @@ class AngleBinsRule(Rule[AngleBinsParameters]):
             if narrow and touches and len(on_leaf) >= p.min_leaf_points:
                 angle = angle_deg(wall.normal, leaf.normal)
                 found = (outline("wall", wall, on_wall), outline("leaf", leaf, on_leaf))
-                return Answer(self._bin(angle), opening_angle_deg=angle, found=found)
+                state = state_by_angle(angle, p.closed_below_deg, p.open_above_deg)
+                return Answer(state, opening_angle_deg=angle, found=found)
         return wall_alone(wall, points, p.wall)
 
     def _planes(self, points: Floats) -> list[tuple[Plane, Floats]]:
@@ -75,8 +76,3 @@ class AngleBinsRule(Rule[AngleBinsParameters]):
             found.append((fit[0], points[fit[1]]))
             points = points[~fit[1]]
         return found
-
-    def _bin(self, angle: float) -> DoorState:
-        if angle < self.parameters.closed_below_deg:
-            return DoorState.CLOSED
-        return DoorState.OPEN if angle > self.parameters.open_above_deg else DoorState.SEMI_OPEN

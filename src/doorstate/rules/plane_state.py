@@ -8,11 +8,11 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from doorstate.rules.base import Answer, Parameters, Rule
+from doorstate.rules.base import Answer, Parameters, Rule, state_by_angle
 from doorstate.rules.plan_lines import Floats, angle_deg
 from doorstate.rules.planes import Plane, normals, pieces, thin, upright_plane
 from doorstate.rules.walls import WallParameters, covered_m, nearby, outline, wall_alone
-from doorstate.types import DoorState, Points
+from doorstate.types import Points
 
 
 class PlaneStateParameters(Parameters):
@@ -101,16 +101,11 @@ class PlaneStateRule(Rule[PlaneStateParameters]):
             return wall_alone(widest.plane, points, p.wall)
         best = max(pairs, key=lambda pair: (pair.whole, pair.wall_m))
         return Answer(
-            self._state(best.angle_deg),
+            state_by_angle(best.angle_deg, p.closed_below_deg, p.open_above_deg),
             opening_angle_deg=best.angle_deg,
             opening_width_m=best.opening_width_m,
             found=(outline("wall", *best.wall), outline("leaf", *best.leaf)),
         )
-
-    def _state(self, angle: float) -> DoorState:
-        if angle < self.parameters.closed_below_deg:
-            return DoorState.CLOSED
-        return DoorState.OPEN if angle > self.parameters.open_above_deg else DoorState.SEMI_OPEN
 
     def _surfaces(self, points: Floats) -> list[_Surface]:
         """Planes of points with similar upright normals, those with most normals first."""

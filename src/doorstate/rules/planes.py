@@ -47,14 +47,16 @@ def upright_plane(points: Floats, threshold_m: float, *, seed: int = 0) -> tuple
 
 def thin(points: Floats, voxel_m: float) -> Floats:
     """The mean point of every occupied voxel (PCL's VoxelGrid); cut far points off first, voxels are counted."""
-    if len(points) == 0:
-        return points
-    cells = np.floor((points - points.min(axis=0)) / voxel_m).astype(np.int64)
+    return grid(points, voxel_m)[1] if len(points) else points
+
+
+def grid(points: Floats, cell_m: float) -> tuple[NDArray[np.int64], Floats]:
+    """Number (N,) of the occupied cell that each of (N, D) points lies in, and the mean points (K, D) of the cells."""
+    cells = np.floor((points - points.min(axis=0)) / cell_m).astype(np.int64)
     keys = np.ravel_multi_index(tuple(cells.T), tuple(cells.max(axis=0) + 1))
-    _, voxel, counts = np.unique(keys, return_inverse=True, return_counts=True)
-    sums = np.stack([np.bincount(voxel, column, len(counts)) for column in points.T], axis=1)
-    means: Floats = sums / counts[:, None]
-    return means
+    _, number, counts = np.unique(keys, return_inverse=True, return_counts=True)
+    sums = np.stack([np.bincount(number, column) for column in points.T], axis=1)
+    return number, sums / counts[:, None]
 
 
 def normals(points: Floats, neighbours: int) -> tuple[Floats, Floats]:

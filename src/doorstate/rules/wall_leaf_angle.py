@@ -21,7 +21,7 @@ from pydantic import Field
 
 from doorstate.rules.base import Answer, Parameters, Rule, Shape, measured
 from doorstate.rules.plan_lines import Flags, Floats, Line, fit_line, strongest_line
-from doorstate.rules.planes import thin
+from doorstate.rules.planes import grid, thin
 from doorstate.types import DoorState, Points
 
 _FEWEST_POINTS = 128  # of a cloud that anything is told from
@@ -121,16 +121,11 @@ class WallLeafAngleRule(Rule[WallLeafAngleParameters]):
     def _plan(self, points: Floats) -> _Plan:
         """Cells of the plan that something upright stands in."""
         chosen = self.parameters
-        cells = np.floor((points[:, :2] - points[:, :2].min(axis=0)) / chosen.cell_m).astype(np.int64)
-        number = np.ravel_multi_index(tuple(cells.T), tuple(cells.max(axis=0) + 1))
-        _, cell, counts = np.unique(number, return_inverse=True, return_counts=True)
-        centres = (
-            np.stack([np.bincount(cell, column) for column in points[:, :2].T], axis=1) / counts[:, None]
-        )
+        cell, centres = grid(points[:, :2], chosen.cell_m)
         level = np.floor(points[:, 2] / _LEVEL_M).astype(np.int64)
         levels = np.unique(np.stack([cell, level], axis=1), axis=0)[:, 0]
-        heights_m: Floats = np.bincount(levels, minlength=len(counts)) * np.float64(_LEVEL_M)
-        tops_m = np.full(len(counts), -np.inf)
+        heights_m: Floats = np.bincount(levels, minlength=len(centres)) * np.float64(_LEVEL_M)
+        tops_m = np.full(len(centres), -np.inf)
         np.maximum.at(tops_m, cell, points[:, 2])
         upright = heights_m >= chosen.upright_m
         return _Plan(centres[upright], heights_m[upright], tops_m[upright])
