@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import csv
+import math
 from pathlib import Path
 
 import numpy as np
@@ -12,9 +13,11 @@ from benchmarks.gate import FAULTS, glass, without
 
 from doorstate.clouds.camera import Pinhole
 from doorstate.clouds.io import ReadOptions, read_cloud
+from doorstate.clouds.preparation import is_measured
 from doorstate.dataset.store import PreparedDataset
 from doorstate.deployment.gate import Gate
 from doorstate.deployment.predictor import Predictor
+from doorstate.errors import ConfigError
 from doorstate.simulation.frames import replay
 from doorstate.simulation.manifest import unflatten
 from doorstate.types import Points
@@ -112,6 +115,28 @@ def test_simulated_doors_pass_and_glass_doors_do_not(small_dataset: PreparedData
         assert gate(frame.points.reshape(-1, 3)) is None
         refused_glass += gate(glass(row, frame)) is not None
     assert refused_glass >= len(rows) - 1
+
+
+def test_small_flat_clouds_are_looked_through_too(small_dataset: PreparedDataset) -> None:
+    gate = Gate()
+    for row in small_dataset.rows[::5]:
+        frame = replay(unflatten(row))
+        torn = np.array(frame.points)
+        torn[:, WIDTH // 4 : 3 * WIDTH // 4] = np.nan
+        for step in (2, 4):
+            whole, holed = (
+                cloud[::step, ::step][is_measured(cloud[::step, ::step])] for cloud in (frame.points, torn)
+            )
+            assert gate(whole) is None
+            assert row["state"] == "open" or gate(holed) is not None
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"margin_share": 0.5}, {"max_hole_share": -1.0}, {"hole_height_share": math.nan}]
+)
+def test_shares_that_switch_a_condition_off_are_refused(wrong: dict[str, float]) -> None:
+    with pytest.raises(ConfigError, match=next(iter(wrong))):
+        Gate(**wrong)
 
 
 def test_a_door_that_is_not_open_never_becomes_open_by_losing_data(small_dataset: PreparedDataset) -> None:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ import torch
 from doorstate.clouds.preparation import normalize, prepare_cloud
 from doorstate.dataset.store import PreparedDataset
 from doorstate.deployment.predictor import Predictor, packaged_networks, packaged_weights
+from doorstate.deployment.rule_predictor import RulePredictor
 from doorstate.errors import CloudContentError, ConfigError, WeightsError
 from doorstate.networks import create_network
 from doorstate.networks.base import PointNetwork
@@ -77,6 +79,32 @@ def test_fewer_points_than_trained_with_are_used_as_they_are(predictor: Predicto
 def test_a_cloud_without_data_is_an_error_and_not_an_answer(predictor: Predictor) -> None:
     with pytest.raises(CloudContentError):
         predictor(np.full((480, 640, 3), np.nan, dtype=np.float32))
+
+
+@pytest.mark.parametrize(
+    ("cloud", "complaint"),
+    [
+        (
+            np.ones((480, 640, 4), np.float32),
+            r"float32 of \(480, 640, 4\); take x, y, z with points\[..., :3\]",
+        ),
+        (np.ones((1000, 4), np.float32), r"float32 of \(1000, 4\)"),
+        (np.ones((480, 640), np.float32), r"float32 of \(480, 640\)"),
+        (np.ones((1000, 2), np.float32), r"float32 of \(1000, 2\)"),
+        (np.ones((1, 480, 640, 3), np.float32), r"float32 of \(1, 480, 640, 3\)"),
+        (None, r"object of \(\)"),
+        ("cloud.pcd", r"<U9 of \(\)"),
+    ],
+)
+def test_what_is_no_array_of_points_is_refused(predictor: Predictor, cloud: Any, complaint: str) -> None:
+    for asked in (predictor, RulePredictor.load("plane_state")):
+        with pytest.raises(CloudContentError, match=complaint):
+            asked(cloud)
+
+
+def test_rows_of_a_list_are_points(predictor: Predictor) -> None:
+    cloud = np.random.default_rng(0).uniform(1, 3, (200, 3)).astype(np.float32)
+    assert predictor(cloud.tolist()).probabilities == predictor(cloud).probabilities  # type: ignore[arg-type]
 
 
 def test_weights_load_by_path_and_by_name(tmp_path: Path) -> None:

@@ -209,5 +209,12 @@ def test_clouds_go_through_the_predictor_and_unusable_ones_are_no_answer() -> No
 
 
 def test_a_state_that_does_not_exist_is_an_error() -> None:
+    for wrong in (
+        {"timeout_s": math.nan},
+        {"timeout_s": 1.0, "hold_s": -1.0},
+        {"timeout_s": 1.0, "hold_s": math.nan},
+    ):
+        with pytest.raises(ConfigError, match="seconds, zero or more"):
+            wait_for("open", [], **wrong)
     with pytest.raises(ConfigError, match="there are closed, semi_open, open"):
         wait_for("ajar", frames((1, UNKNOWN)), 1.0)

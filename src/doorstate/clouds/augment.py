@@ -52,7 +52,14 @@ class AugmentationDraw(NamedTuple):
 def draw_augmentation(
     augmentation: Augmentation, rng: np.random.Generator, clouds: int, points: int
 ) -> AugmentationDraw:
-    """Draw the changes of one batch."""
+    """Draw the changes of one batch.
+
+    Args:
+        augmentation: how far clouds are changed.
+        rng: what is drawn from.
+        clouds: B, how many there are.
+        points: N of each.
+    """
     yaw = rng.uniform(-1, 1, clouds) * math.radians(augmentation.yaw_deg)
     tilt_sigma = math.radians(augmentation.tilt_deg)
     tilt = np.clip(rng.normal(0, 1, (clouds, 2)), -3, 3) * tilt_sigma

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from doorstate.clouds.declared import check_declared
+from doorstate.clouds.declared import check_declared, check_points
 from doorstate.clouds.png import parse_depth_png
 from doorstate.clouds.pointcloud2 import MessageBytes
 from doorstate.errors import CloudReadError
@@ -41,6 +41,7 @@ def pixels_from_image(
     dtype = np.dtype(DEPTH_ENCODINGS[encoding]).newbyteorder(">" if is_bigendian else "<")
     if min(height, width) < 1 or width * dtype.itemsize > step:
         raise CloudReadError(f"is damaged: {height} rows of {width} pixels in {step} bytes are declared")
+    check_points(height * width)
     content = np.frombuffer(data, np.uint8)
     check_declared(height * step, len(content), "bytes")
     pixels: NDArray[Any] = np.ndarray((height, width), dtype, content, strides=(step, dtype.itemsize))

@@ -10,7 +10,7 @@ from typing import Protocol, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from doorstate.clouds.declared import check_declared
+from doorstate.clouds.declared import check_declared, check_points
 from doorstate.errors import CloudReadError
 from doorstate.types import Points
 
@@ -65,6 +65,7 @@ def points_from_pointcloud2(
         raise CloudReadError(
             f"is damaged: {height} x {width} points in steps of {point_step} and {row_step} bytes are declared"
         )
+    check_points(height * width)
     if height * width == 0:
         return np.empty((0, 3), np.float32)
     places = [_place(axis, fields, point_step) for axis in "xyz"]

@@ -47,11 +47,12 @@ def prepare_cloud(
             network has never seen, such as the end of a corridor, would take most of its points.
 
     Raises:
-        CloudContentError: empty, nothing measured, too few points, or units that cannot be metres.
+        CloudContentError: of another form, empty, nothing measured, too few points, or units that cannot be metres.
     """
+    points = check_form(points)
     if thin:
         pixels = _thinned_pixels(points.shape, count)
-        prepared = prepare_cloud(np.asarray(points).reshape(-1, 3)[pixels], count, max_depth_m=max_depth_m)
+        prepared = prepare_cloud(points.reshape(-1, 3)[pixels], count, max_depth_m=max_depth_m)
         return PreparedCloud(prepared.points, pixels[prepared.indices])
     flat = np.asarray(points, dtype=np.float32).reshape(-1, 3)
     if len(flat) == 0:
@@ -81,6 +82,21 @@ def prepare_cloud(
             f"too few points: {len(chosen)} distinct of {len(clean)} measured, at least {MIN_POINTS} are needed"
         )
     return PreparedCloud(clean[chosen], measured[chosen])
+
+
+def check_form(points: Points) -> Points:
+    """The points as an array, if it is one of points.
+
+    Raises:
+        CloudContentError: another form than (N, 3) or (H, W, 3), or no numbers: with a fourth value, such as an
+            intensity, rows would be read across one another.
+    """
+    cloud = np.asarray(points)
+    if cloud.dtype.kind not in "fiu" or cloud.ndim not in (2, 3) or cloud.shape[-1] != 3:
+        form = f"{cloud.dtype} of {cloud.shape}"
+        hint = "; take x, y, z with points[..., :3]" if cloud.ndim in (2, 3) and cloud.shape[-1] > 3 else ""
+        raise CloudContentError(f"a cloud is numbers of (N, 3) or (H, W, 3), this is {form}{hint}")
+    return cloud
 
 
 def is_measured(points: NDArray[np.floating[Any]]) -> NDArray[np.bool_]:

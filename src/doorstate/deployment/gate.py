@@ -9,11 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from doorstate.clouds.preparation import MIN_POINTS, is_measured
+from doorstate.errors import ConfigError
 from doorstate.types import Points
 
 # Cells of 8 x 8 pixels in a 640 x 480 image: hundredths of a door, tens of pixels to judge by.
 _GRID_ROWS, _GRID_COLUMNS = 60, 80
 _POINTS_PER_CELL = 16  # on average; a flat cloud with fewer has gaps of its own
+_COARSEST = (
+    1 / 16
+)  # of the cells; with fewer than 15 x 20 a gap beside a leaf is no longer told from a hole in it
 _CELL_MEASURED = 1 / 8  # of a cell's pixels; fewer are flying pixels
 _WIDEST_TANGENT = (
     1.0  # flat clouds are looked at within 45 degrees of straight ahead: no depth camera sees more
@@ -57,12 +61,26 @@ class Gate:
     max_hole_share: float = 0.1
     margin_share: float = 0.1
 
+    def __post_init__(self) -> None:
+        """Refuse shares that would switch a condition off without a word.
+
+        Raises:
+            ConfigError: a share below 0 or above 1, or margins that leave no column.
+        """
+        for name in ("min_measured_share", "hole_height_share", "max_hole_share", "margin_share"):
+            if not 0 <= getattr(self, name) <= 1:
+                raise ConfigError(f"gate: {name} {getattr(self, name)}: a share is from 0 to 1")
+        if self.margin_share > 0.4:
+            raise ConfigError(
+                f"gate: margin_share {self.margin_share}: at most 0.4, so that columns are left"
+            )
+
     def __call__(self, cloud: Points) -> str | None:
         """Why no state may be told from a cloud, or None if one may.
 
         Args:
             cloud: (N, 3) or organized (H, W, 3) metres, x forward, y left, z up, not measured as in clouds.preparation.
-                Holes are looked for in organized clouds and in flat ones of 76,800 points or more.
+                Holes are looked for in organized clouds and in flat ones of 4800 points or more.
         """
         cloud = np.asarray(cloud)
         if cloud.ndim == 3 and cloud.shape[0] >= 4 * _GRID_ROWS:
@@ -105,10 +123,11 @@ class Gate:
         """
         if cloud.ndim == 3:
             filled, reach_m = _image_cells(cloud, measured)
-        elif np.count_nonzero(measured) >= _POINTS_PER_CELL * _GRID_ROWS * _GRID_COLUMNS:
-            filled, reach_m = _ray_cells(cloud[measured])
         else:
-            return 0.0
+            share = min(1.0, np.count_nonzero(measured) / (_POINTS_PER_CELL * _GRID_ROWS * _GRID_COLUMNS))
+            if share < _COARSEST:
+                return 0.0
+            filled, reach_m = _ray_cells(cloud[measured], share)
         margin = round(self.margin_share * filled.shape[1])
         filled, reach_m = (
             filled[:, margin : filled.shape[1] - margin],
@@ -167,17 +186,18 @@ def _quarter_turns(filled: NDArray[np.bool_], steepness: NDArray[np.float64]) ->
     return int(np.argmax((-down, right, down, -right)))
 
 
-def _ray_cells(points: Points) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
-    """The same cells of points (N, 3) without an image, between the outermost rays ahead."""
+def _ray_cells(points: Points, share: float) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
+    """The same cells, or a share of so many, of points (N, 3) without an image, between the outermost rays ahead."""
+    rows, columns = round(_GRID_ROWS * share**0.5), round(_GRID_COLUMNS * share**0.5)
     ahead = points[points[:, 0] > 0].astype(np.float64)
     tangents = -ahead[:, 1:] / ahead[:, :1]  # (N, 2) right, down
     near = (np.abs(tangents) <= _WIDEST_TANGENT).all(axis=1)
     ahead, tangents = ahead[near], tangents[near]
     low, high = np.quantile(tangents, (0.005, 0.995), axis=0) if len(ahead) else (np.zeros(2), np.ones(2))
-    shape = np.array((_GRID_COLUMNS, _GRID_ROWS))
+    shape = np.array((columns, rows))
     cell = np.clip((tangents - low) / np.maximum(high - low, 1e-6) * shape, 0, shape - 1).astype(np.int64)
-    number = cell[:, 1] * _GRID_COLUMNS + cell[:, 0]
-    count = np.bincount(number, minlength=_GRID_ROWS * _GRID_COLUMNS)
-    reach_m = np.bincount(number, np.hypot(ahead[:, 0], ahead[:, 1]), _GRID_ROWS * _GRID_COLUMNS)
-    grid = (_GRID_ROWS, _GRID_COLUMNS)
+    number = cell[:, 1] * columns + cell[:, 0]
+    count = np.bincount(number, minlength=rows * columns)
+    reach_m = np.bincount(number, np.hypot(ahead[:, 0], ahead[:, 1]), rows * columns)
+    grid = (rows, columns)
     return (count > 0).reshape(grid), (reach_m / np.maximum(count, 1)).reshape(grid)

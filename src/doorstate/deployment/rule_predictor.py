@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from doorstate.clouds.preparation import check_form
 from doorstate.deployment.gate import Gate
 from doorstate.deployment.predictor import DEFAULT_GATE, Prediction
 from doorstate.errors import CloudContentError
@@ -54,6 +55,7 @@ class RulePredictor:
             CloudContentError: nothing was measured.
         """
         started = time.perf_counter()
+        points = check_form(points)
         count = len(measured(points))
         if count == 0:
             raise CloudContentError("nothing was measured: the cloud holds no points")

@@ -158,11 +158,13 @@ def wait_for(
         longest_gap_s: as of `Holding`.
 
     Raises:
-        ConfigError: no such state, or a stamp that is not finite.
+        ConfigError: no such state, seconds below zero, or a stamp that is not finite.
     """
     wanted = DoorState[state.upper()] if isinstance(state, str) and state in STATES else state
     if not isinstance(wanted, DoorState):
         raise ConfigError(f"no state {state!r}: there are {', '.join(STATES)}")
+    if not (timeout_s >= 0 and hold_s >= 0):
+        raise ConfigError(f"timeout_s {timeout_s} and hold_s {hold_s}: both are seconds, zero or more")
     state_filter = state_filter or StateFilter()
     holding = Holding(longest_gap_s)
     last_s: float | None = None
