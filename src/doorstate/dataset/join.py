@@ -31,29 +31,29 @@ def join_datasets(sources: Sequence[Path], folder: Path) -> PreparedDataset:
     """
     if not is_vacant(folder):
         raise ConfigError(f"{folder}: exists and holds something; choose another folder")
-    parts = [open_dataset(source) for source in sources]
-    num_points = parts[0].num_points
-    for source, part in zip(sources, parts, strict=True):
-        if part.num_points != num_points:
+    datasets = [open_dataset(source) for source in sources]
+    num_points = datasets[0].num_points
+    for source, dataset in zip(sources, datasets, strict=True):
+        if dataset.num_points != num_points:
             raise ConfigError(
-                f"{source}: has {part.num_points} points a cloud, {sources[0]} has {num_points}; prepare one anew"
+                f"{source}: has {dataset.num_points} points a cloud, {sources[0]} has {num_points}; prepare one anew"
             )
-    rows = [row for part in parts for row in part.rows]
+    rows = [row for dataset in datasets for row in dataset.rows]
     name, count = Counter(row["sample_id"] for row in rows).most_common(1)[0]
     if count > 1:
         raise DatasetError(
             f"sample {name!r} is there {count} times; data sets that share names cannot be joined"
         )
     folder.mkdir(parents=True, exist_ok=True)
-    _stack(folder / CLOUDS, [part.clouds for part in parts])
-    if all(part.knows_parts for part in parts):
-        every = [part.parts_of(np.arange(len(part)), num_points) for part in parts]
+    _stack(folder / CLOUDS, [dataset.clouds for dataset in datasets])
+    if all(dataset.knows_parts for dataset in datasets):
+        every = [dataset.parts_of(np.arange(len(dataset)), num_points) for dataset in datasets]
         _stack(folder / PARTS, every)
     write_csv(folder / MANIFEST, rows)
-    kinds = {part.description.kind for part in parts}
+    kinds = {dataset.description.kind for dataset in datasets}
     DatasetDescription(
         kind="simulated" if kinds == {"simulated"} else "imported",
-        source=" + ".join(part.description.source for part in parts),
+        source=" + ".join(dataset.description.source for dataset in datasets),
         num_points=num_points,
         samples=len(rows),
         doorstate_version=__version__,

@@ -105,6 +105,16 @@ def prepare_dataset(
     A cloud with fewer than `num_points` distinct points, or that cannot be read, is left out and listed in
     `rejected.csv` with the reason: every cloud of a prepared data set has exactly `num_points` distinct points.
 
+    Args:
+        source: what is prepared.
+        folder: where to; what a killed preparation or shards of it have begun is continued.
+        num_points: of every cloud.
+        poses_csv: distances and angles of class folders (`dataset.class_folders`).
+        options: what the files do not say of themselves.
+        workers: processes; None is one per processor.
+        progress: called with pieces done and pieces in all.
+        layout: name of another's layout of folders.
+
     Raises:
         ConfigError: `folder` holds something prepared from another source or with other settings.
         DatasetError: nothing to prepare, or nothing could be prepared.

@@ -27,9 +27,13 @@ _HINGE = {"left": 1.0, "right": 0.0}
 
 
 def door_targets(rows: Sequence[Mapping[str, str]], centroids: Points) -> Targets:
-    """Targets of samples whose clouds were centred on (M, 3) centroids, in metres, and divided by 3 m.
+    """Targets of samples whose clouds were centred and divided by 3 m.
 
     A frame's yaw is that of its outward normal, which points to the robot's side of the wall.
+
+    Args:
+        rows: M of the manifest.
+        centroids: (M, 3) metres, which the clouds were centred on.
     """
     angle = np.radians(numbers(rows, "opening_angle_deg"))
     hinge = [_HINGE.get(row.get("hinge") or row.get("door.hinge", ""), math.nan) for row in rows]
@@ -58,12 +62,16 @@ def known_parts(parts: NDArray[np.uint8]) -> NDArray[np.int64]:
 
 
 def augmented(targets: Targets, draw: AugmentationDraw | None) -> Targets:
-    """Targets, all or some, of clouds that were changed by a draw: turned, mirrored, scaled and moved with them."""
+    """Targets of clouds that were changed by a draw: turned, mirrored, scaled and moved with them.
+
+    Args:
+        targets: all or some, of B clouds.
+        draw: of the same clouds; None changes nothing.
+    """
     if draw is None or not targets:
         return targets
-    plan = draw.linear[:, :2, :2].astype(
-        np.float64
-    )  # a tilt of a few degrees moves a door by less than its leaf
+    # A tilt of a few degrees moves a door by less than its leaf.
+    plan = draw.linear[:, :2, :2].astype(np.float64)
     determinant = np.linalg.det(plan)
     scale = np.sqrt(np.abs(determinant))[:, None]
     changed = dict(targets)

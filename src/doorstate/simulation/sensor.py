@@ -138,6 +138,9 @@ def incidence(
 
     Args:
         rendered: what `render` or `render_behind_glass` saw of the same boxes, cut or not.
+        boxes: the scene, in the door frame.
+        pose: of the camera, in the door frame.
+        intrinsics: of the camera.
 
     Returns:
         (H, W) float32 radians in [0, pi / 2]; 0 where nothing is hit.

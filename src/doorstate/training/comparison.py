@@ -31,7 +31,7 @@ from doorstate.rules import create_rule
 from doorstate.training.fit import RunConfig, fit, threads
 from doorstate.training.recipes import Recipe, find_recipe
 from doorstate.training.rule_run import RuleRunConfig, answer
-from doorstate.training.run_folder import RunFolder, read_json, write_json
+from doorstate.training.run_folder import RunFolder, check_same, write_json
 from doorstate.types import PARTS
 
 
@@ -155,7 +155,7 @@ def runs_of(experiment: Experiment, folder: Path) -> list[Run]:
 
 
 def run_of(folder: Path, network: str, fold: int) -> RunFolder:
-    """Where a run of a comparison lies."""
+    """Where the run of a network or rule on one fold lies in a comparison's folder."""
     return RunFolder(folder / "runs" / network / f"fold{fold}")
 
 
@@ -192,12 +192,7 @@ def prepare_comparison(experiment: Experiment, folder: Path) -> None:
         | {network: experiment.recipe_of(network).model_dump(mode="json") for network in experiment.networks}
     }
     if path.is_file():
-        found = {"rules": [], "heads": []} | read_json(path)  # a folder may be older than rules and heads
-        changed = sorted(key for key in {*found, *settings} if found.get(key) != settings.get(key))
-        if changed:
-            raise RunError(
-                f"{folder}: holds a comparison with another {', '.join(changed)}; choose another folder"
-            )
+        check_same(path, settings, "a comparison")
     dataset = open_dataset(Path(experiment.dataset))
     splits_path = folder / "splits.csv"
     if not splits_path.is_file():
@@ -226,7 +221,23 @@ def train_one(
     fold: int,
     splits_path: Path,
 ) -> dict[str, Any]:
-    """Train one network of an experiment on one fold."""
+    """Train one network of an experiment on one fold.
+
+    Args:
+        experiment: what is run.
+        folder: of this run.
+        dataset: the experiment's.
+        network: its name.
+        fold: from 0.
+        splits_path: `splits.csv` of the comparison.
+
+    Returns:
+        The run's metrics.
+
+    Raises:
+        ConfigError: there is no such fold.
+        DatasetError, RunError, WeightsError: as of `fit`.
+    """
     splits = read_splits(splits_path)
     if not 0 <= fold < len(splits):
         raise ConfigError(f"there is no fold {fold}: folds are 0 to {len(splits) - 1}")
@@ -249,7 +260,11 @@ def train_one(
 def answer_one(
     experiment: Experiment, folder: Path, dataset: PreparedDataset, rule: str, fold: int, splits_path: Path
 ) -> dict[str, Any]:
-    """Ask one rule of an experiment for one fold."""
+    """Ask one rule of an experiment for one fold; arguments and result are those of `train_one`.
+
+    Raises:
+        DatasetError, RunError: as of `rule_run.answer`.
+    """
     config = RuleRunConfig(
         rule=rule,
         parameters=create_rule(rule).parameters.model_dump(mode="json"),

@@ -70,7 +70,7 @@ class Evaluation(NamedTuple):
 
     loss: float
     probabilities: np.ndarray
-    labels: np.ndarray
+    labels: np.ndarray  # (M,) int64, NO_STATE without a door
     answers: dict[str, np.ndarray]  # by head, (M, answers), in the network's units
     part_counts: np.ndarray | None  # (parts, parts) points by true and predicted part
 
@@ -82,10 +82,12 @@ class Evaluation(NamedTuple):
 
     @property
     def macro_f1(self) -> float:
+        """Mean F1 of the states, 0 to 1, of the samples that have one."""
         return float(f1_score(*self._of_doors(), labels=range(len(STATES)), average="macro", zero_division=0))
 
     @property
     def accuracy(self) -> float:
+        """Share of right answers, 0 to 1, to the samples that have a state."""
         return float(accuracy_score(*self._of_doors()))
 
     def _of_doors(self) -> tuple[np.ndarray, np.ndarray]:

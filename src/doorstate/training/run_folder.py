@@ -14,7 +14,7 @@ from doorstate.errors import RunError
 from doorstate.files import read_csv, write_csv, write_text
 from doorstate.types import STATES
 
-_SINCE: dict[str, Any] = {"heads": []}  # of configurations: what older folders do not know
+_SINCE: dict[str, Any] = {"heads": [], "rules": []}  # of settings: what older folders do not know
 
 
 class RunFolder:
@@ -36,6 +36,7 @@ class RunFolder:
 
     @property
     def finished(self) -> bool:
+        """Whether the run has been tested, so that nothing is left to do."""
         return self.metrics.is_file()
 
     def claim(self, config: Mapping[str, Any], environment: Mapping[str, Any]) -> None:
@@ -45,13 +46,7 @@ class RunFolder:
             RunError: the folder holds another run.
         """
         if self.config.is_file():
-            added = {key: value for key, value in _SINCE.items() if key in config}
-            found = added | read_json(self.config)
-            if found != config:
-                changed = sorted(key for key in {*found, *config} if found.get(key) != config.get(key))
-                raise RunError(
-                    f"{self.path}: holds a run with another {', '.join(changed)}; choose another folder"
-                )
+            check_same(self.config, config, "a run")
         else:
             write_json(self.config, config)
         if not self.finished:
@@ -85,6 +80,16 @@ class RunFolder:
         write_json(self.metrics, metrics)
         self.checkpoint.unlink(missing_ok=True)
         self.position.unlink(missing_ok=True)
+
+
+def check_same(path: Path, settings: Mapping[str, Any], what: str) -> None:
+    """Raise RunError unless a folder's file holds these settings, or those of an older version that mean the same."""
+    found = {key: value for key, value in _SINCE.items() if key in settings} | read_json(path)
+    changed = sorted(key for key in {*found, *settings} if found.get(key) != settings.get(key))
+    if changed:
+        raise RunError(
+            f"{path.parent}: holds {what} with another {', '.join(changed)}; choose another folder"
+        )
 
 
 def write_predictions(

@@ -25,7 +25,16 @@ class ConstantAxial(Frozen):
     def sigma_m(
         self, depth_m: DepthImage, incidence_rad: NDArray[np.float32], focal_px: float
     ) -> NDArray[np.float32]:
-        """Standard deviation of each pixel."""
+        """Standard deviation of each pixel.
+
+        Args:
+            depth_m: (H, W) metres.
+            incidence_rad: (H, W), of `sensor.incidence`.
+            focal_px: of the camera.
+
+        Returns:
+            (H, W) metres.
+        """
         return np.full(depth_m.shape, self.deviation_m, np.float32)
 
 
@@ -46,7 +55,7 @@ class NguyenAxial(Frozen):
     def sigma_m(
         self, depth_m: DepthImage, incidence_rad: NDArray[np.float32], focal_px: float
     ) -> NDArray[np.float32]:
-        """Standard deviation of each pixel; beyond 85 degrees that at 85."""
+        """As `ConstantAxial.sigma_m`; beyond 85 degrees that at 85."""
         sigma = depth_m - np.float32(self.nearest_m)
         sigma *= sigma
         sigma *= np.float32(self.square_per_m)
@@ -68,7 +77,7 @@ class StereoAxial(Frozen):
     def sigma_m(
         self, depth_m: DepthImage, incidence_rad: NDArray[np.float32], focal_px: float
     ) -> NDArray[np.float32]:
-        """Standard deviation of each pixel."""
+        """As `ConstantAxial.sigma_m`."""
         return depth_m * depth_m * np.float32(self.disparity_px / (focal_px * self.baseline_m))
 
 

@@ -21,7 +21,7 @@ class Lateral(Frozen):
     reach_px: int = Field(default=3, ge=1)  # chosen: no pixel looks farther aside
 
     def sigma_px(self, incidence_rad: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Of each pixel."""
+        """(M,) pixels, of rays that meet surfaces at (M,) angles."""
         steep = np.minimum(incidence_rad, np.float32(1.5))
         ratio: NDArray[np.float32] = np.divide(steep, np.float32(np.pi / 2) - steep)
         return ratio * np.float32(self.slope_px) + np.float32(self.base_px)
