@@ -175,7 +175,8 @@ def test_depth_of_another_size_names_both_sizes(tmp_path: Path, valid: dict[str,
 @pytest.mark.parametrize(
     ("name", "data", "reason"),
     [
-        ("a.obj", b"v 1 2 3", "unknown file type"),
+        ("a.obj", b"v 1 2 3", "unknown file type; clouds are "),
+        ("a.mcap", b"1 2 3", "a recording: give it by --bag"),
         ("a", b"1 2 3", "unknown file type"),
         ("a.pcd", b"", r"empty \(0 bytes\)"),
         ("a.npy", b"\x93NUMPY\x01\x00", "damaged, or no .npy file"),

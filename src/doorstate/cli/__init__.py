@@ -51,6 +51,8 @@ for command in (
 ):
     app.command()(command)
 
+_RESUMABLE = {"simulate", "prepare", "train", "compare", "resolution", "transfer"}
+
 
 def main() -> None:
     """Run the command line; our own exceptions become one line on standard error."""
@@ -59,5 +61,6 @@ def main() -> None:
     except DoorstateError as error:
         sys.exit(f"doorstate: {error}")
     except KeyboardInterrupt:
-        print("doorstate: stopped; the same command goes on from here", file=sys.stderr)  # noqa: T201
+        goes_on = "; the same command goes on from here" if _RESUMABLE & set(sys.argv[1:2]) else ""
+        print(f"doorstate: stopped{goes_on}", file=sys.stderr)  # noqa: T201
         sys.exit(130)

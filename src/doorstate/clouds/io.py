@@ -73,6 +73,7 @@ class ReadOptions:
 
 
 DEFAULT_OPTIONS = ReadOptions()
+_BAGS = (".bag", ".db3", ".mcap")
 UNITS_M = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "km": 1000.0}
 
 
@@ -164,7 +165,8 @@ def parse_cloud(data: bytes, suffix: str, options: ReadOptions = DEFAULT_OPTIONS
 def check_suffix(suffix: str) -> None:
     """Raise CloudReadError unless files that end so can be read."""
     if suffix.lower() not in _PARSERS:
-        raise CloudReadError(f"unknown file type: give one of {' '.join(CLOUD_SUFFIXES)}")
+        hint = "a recording: give it by --bag" if suffix.lower() in _BAGS else "unknown file type"
+        raise CloudReadError(f"{hint}; clouds are {' '.join(CLOUD_SUFFIXES)}")
 
 
 def find_clouds(paths: Sequence[Path]) -> list[Path]:
@@ -184,7 +186,12 @@ def find_clouds(paths: Sequence[Path]) -> list[Path]:
             members = [member for member in path.rglob("*") if member.is_file()]
             clouds = [member for member in members if _is_cloud(member.relative_to(path))]
             if not clouds:
-                raise CloudReadError(f"{path}: no clouds in this folder ({' '.join(CLOUD_SUFFIXES)})")
+                hint = (
+                    "a recording: give it by --bag"
+                    if any(m.suffix in _BAGS for m in members)
+                    else "no clouds in this folder"
+                )
+                raise CloudReadError(f"{path}: {hint}; clouds are {' '.join(CLOUD_SUFFIXES)}")
             found += sorted(clouds, key=_natural_order)
         elif path.exists():
             found.append(path)

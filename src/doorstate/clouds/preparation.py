@@ -18,6 +18,13 @@ SCALE_M = 3.0  # half the depth of a typical frame: networks were designed for c
 # No depth camera reaches farther; a cloud in millimetres has medians in the thousands.
 _LARGEST_MEDIAN_M = 50.0
 _SMALLEST_MEDIAN_M = 0.02
+_LIKELY_MEDIAN_M = (0.8, 8.0)  # less than a factor of ten apart, so that one unit fits
+_OTHER_UNITS = {
+    "mm": ("millimetres", 0.001),
+    "cm": ("centimetres", 0.01),
+    "dm": ("decimetres", 0.1),
+    "km": ("kilometres", 1000.0),
+}
 _NO_RETURN = 1e6  # in any unit; some drivers write FLT_MAX where nothing returned
 _PIXELS_PER_POINT = 16  # that thinning leaves to choose from
 _UNITS_FROM_POINTS = 4096
@@ -146,9 +153,17 @@ def _check_units(points: Points) -> None:
     median = float(np.median(np.linalg.norm(some, axis=1)))
     if median > _LARGEST_MEDIAN_M:
         raise CloudContentError(
-            f"half of the points are more than {median:.0f} m away: millimetres? say --units mm"
+            f"half of the points are more than {median:.0f} m away: {_likely_unit(median)}"
         )
     if median < _SMALLEST_MEDIAN_M:
         raise CloudContentError(
-            f"half of the points are within {median * 1000:.2g} mm of the camera: kilometres? say --units km"
+            f"half of the points are within {median * 1000:.2g} mm of the camera: {_likely_unit(median)}"
         )
+
+
+def _likely_unit(median: float) -> str:
+    """A question about the unit that would bring half of the points to where doors are."""
+    for unit, (name, metres) in _OTHER_UNITS.items():
+        if _LIKELY_MEDIAN_M[0] <= median * metres <= _LIKELY_MEDIAN_M[1]:
+            return f"{name}? say --units {unit}"
+    return "in which unit is it? say --units"
