@@ -79,7 +79,10 @@ def test_repeated_points_are_taken_once() -> None:
         (np.ones((500, 3)), "too few points: 1 distinct of 500 measured, at least 128 are needed"),
         (cloud(500) * 1000, "half of the points are more than .* m away: millimetres[?] say --units mm"),
         (cloud(500) * 100, "half of the points are more than .* m away: centimetres[?] say --units cm"),
-        (cloud(500) * 15000, "half of the points are more than .* m away: in which unit is it[?] say --units"),
+        (
+            cloud(500) * 15000,
+            "half of the points are more than .* m away: in which unit is it[?] say --units",
+        ),
         (
             cloud(500) / 1000,
             "half of the points are within .* mm of the camera: kilometres[?] say --units km",
