@@ -28,6 +28,7 @@ import uvicorn
 from PIL import Image
 
 import doorstate
+from doorstate.cli.service import _listen
 from doorstate.clouds.io import CLOUD_SUFFIXES
 from doorstate.clouds.pcd import write_pcd
 from doorstate.deployment.predictor import Predictor
@@ -370,6 +371,13 @@ def test_the_command_listens_answers_and_stops_cleanly(tmp_path: Path) -> None:
         process.send_signal(signal.SIGTERM)
         out, err = process.communicate(timeout=10)
     assert (process.returncode, out, err) == (0, "", "")
+
+
+def test_no_part_of_an_answer_waits_for_the_one_before() -> None:
+    with _listen("127.0.0.1", 0) as listening, socket.create_connection(listening.getsockname()):
+        accepted, _ = listening.accept()
+        with accepted:
+            assert accepted.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
 
 
 def test_a_port_that_is_taken_is_one_line(run: Run, tmp_path: Path) -> None:
