@@ -6,7 +6,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from pydantic import Field, ValidationError
 
@@ -33,6 +33,8 @@ from doorstate.training.recipes import Recipe, find_recipe
 from doorstate.training.rule_run import RuleRunConfig, answer
 from doorstate.training.run_folder import RunFolder, check_same, write_json
 from doorstate.types import PARTS
+
+M = TypeVar("M", bound=Frozen)
 
 
 class Experiment(Frozen):
@@ -135,6 +137,18 @@ def load_experiment(path: Path | None, overrides: Mapping[str, Any]) -> Experime
     )
     experiment.check()
     return experiment
+
+
+def read_study(path: Path, model: type[M]) -> M:
+    """A study file, which bears the name of its file unless it says another.
+
+    Raises:
+        ConfigError: missing, no TOML, or an unknown or wrong value.
+    """
+    try:
+        return model.model_validate({"name": path.stem} | read_toml(path, "a study"))
+    except ValidationError as error:
+        raise ConfigError(f"{path}: {first_problem(error)}") from error
 
 
 def read_toml(path: Path, what: str) -> dict[str, Any]:

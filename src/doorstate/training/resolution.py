@@ -7,13 +7,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import Field, ValidationError
+from pydantic import Field
 
 from doorstate.clouds.preparation import MIN_POINTS
-from doorstate.errors import ConfigError, first_problem
 from doorstate.models import Frozen
 from doorstate.networks import list_networks
-from doorstate.training.comparison import Experiment, read_toml
+from doorstate.training.comparison import Experiment, read_study
 
 AS_TRAINED, FINE_TUNED = "as-trained", "fine-tuned"
 
@@ -62,10 +61,7 @@ def load_study(path: Path) -> ResolutionStudy:
     Raises:
         ConfigError: missing, no TOML, or an unknown or wrong value.
     """
-    try:
-        study = ResolutionStudy.model_validate({"name": path.stem} | read_toml(path, "a study"))
-    except ValidationError as error:
-        raise ConfigError(f"{path}: {first_problem(error)}") from error
+    study = read_study(path, ResolutionStudy)
     for _, experiment in study.experiments():
         experiment.check()
     return study

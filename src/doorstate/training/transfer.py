@@ -7,15 +7,15 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
-from pydantic import Field, ValidationError
+from pydantic import Field
 
 from doorstate.clouds.preparation import NUM_POINTS
 from doorstate.dataset.splits import UNSEEN, Role, read_splits, write_splits
 from doorstate.dataset.store import open_dataset
-from doorstate.errors import ConfigError, RunError, first_problem
+from doorstate.errors import ConfigError, RunError
 from doorstate.models import Frozen
 from doorstate.networks import list_networks
-from doorstate.training.comparison import Experiment, read_toml
+from doorstate.training.comparison import Experiment, read_study
 from doorstate.training.run_folder import read_json
 
 _Name = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9-]*$")]
@@ -95,10 +95,7 @@ def load_transfer(path: Path) -> TransferStudy:
     Raises:
         ConfigError: missing, no TOML, or an unknown or wrong value.
     """
-    try:
-        return TransferStudy.model_validate({"name": path.stem} | read_toml(path, "a study"))
-    except ValidationError as error:
-        raise ConfigError(f"{path}: {first_problem(error)}") from error
+    return read_study(path, TransferStudy)
 
 
 def _seen(comparison: str) -> set[str]:
