@@ -4,7 +4,8 @@
 DoorstateError
 ├── CloudError             one input file or array cannot be used
 │   ├── CloudReadError     unreadable, truncated, unknown format
-│   └── CloudContentError  readable, but empty, all NaN, too few points, wrong units
+│   └── CloudContentError  readable, but of another form or in wrong units
+│       └── TooFewPointsError  empty, all NaN, or hardly anything measured
 ├── CameraError            intrinsics or depth settings missing or impossible
 ├── ConfigError            an option or experiment file asks for something that does not exist
 ├── DatasetError           a data set folder is missing, incomplete or inconsistent
@@ -42,6 +43,10 @@ class CloudReadError(CloudError):
 
 class CloudContentError(CloudError):
     """The cloud was read, but holds nothing a door's state can be told from."""
+
+
+class TooFewPointsError(CloudContentError):
+    """Too little was measured: a moment of the camera's, and not how its clouds are read."""
 
 
 class CameraError(DoorstateError):

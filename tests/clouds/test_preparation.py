@@ -72,9 +72,9 @@ def test_repeated_points_are_taken_once() -> None:
     ("raw", "message"),
     [
         (np.zeros((0, 3)), "the cloud is empty: it holds no points"),
-        (np.full((500, 3), NAN), "none of the 500 points was measured: all are NaN or infinite"),
-        (np.full((500, 3), INF), "none of the 500 points was measured: all are NaN or infinite"),
-        (np.zeros((500, 3)), "all 500 measured points lie at the origin: the cloud holds no surface"),
+        (np.full((500, 3), NAN), "nothing was measured: all points are NaN or infinite"),
+        (np.full((500, 3), INF), "nothing was measured: all points are NaN or infinite"),
+        (np.zeros((500, 3)), "all measured points lie at the origin: the cloud holds no surface"),
         (cloud(MIN_POINTS - 1), "too few points: 127 measured, at least 128 are needed"),
         (np.ones((500, 3)), "too few points: 1 distinct of 500 measured, at least 128 are needed"),
         (cloud(500) * 1000, "half of the points are more than .* m away: millimetres[?] say --units mm"),

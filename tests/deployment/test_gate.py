@@ -81,6 +81,9 @@ def test_small_holes_and_the_edges_of_the_image_are_let_through() -> None:
         (np.zeros((HEIGHT, WIDTH, 3), dtype=np.float32), "too few points"),
         (room().reshape(-1, 3)[:100], "too few points"),
         (room(0.5), "half of the points are within"),
+        (room(8.0, floor_m=9.0), "half of the points are beyond"),
+        (room()[..., (1, 2, 0)] * np.float32((-1, -1, 1)), "of the points lie behind the camera"),  # optical
+        (room() - np.float32((3.2, 0, 0)), "of the points lie behind the camera"),
         (room()[HEIGHT * 3 // 4 :], "m high: too little for a door"),
         (np.ascontiguousarray(room()[:, : WIDTH // 2]), "degrees wide"),
         (room().reshape(-1, 3)[room().reshape(-1, 3)[:, 1] > 0], "degrees wide"),
@@ -165,4 +168,5 @@ def test_recorded_frames_pass() -> None:
             cloud = read_cloud(REAL / row["file"], ReadOptions(intrinsics=camera))
             refused[row["file"]] = Gate()(cloud)
     assert len(refused) >= 20
+    assert "behind the camera" in (Gate()(read_cloud(REAL / "room_01_openings.pcd")) or "")  # a lidar's
     assert {name: reason for name, reason in refused.items() if reason is not None} == {}

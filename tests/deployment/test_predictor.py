@@ -76,9 +76,24 @@ def test_fewer_points_than_trained_with_are_used_as_they_are(predictor: Predicto
     assert len(prepare_cloud(cloud, 160).points) == 140
 
 
-def test_a_cloud_without_data_is_an_error_and_not_an_answer(predictor: Predictor) -> None:
-    with pytest.raises(CloudContentError):
-        predictor(np.full((480, 640, 3), np.nan, dtype=np.float32))
+def test_a_frame_without_data_is_unknown_and_costs_its_batch_nothing(predictor: Predictor) -> None:
+    cloud = np.random.default_rng(0).uniform(1, 3, (200, 3)).astype(np.float32)
+    blank = np.full((480, 640, 3), np.nan, dtype=np.float32)
+    careless = Predictor(predictor.network, predictor.card, predictor.points, gate=None)
+    for asked in (predictor, careless):
+        first, empty, few, last = asked.batch([cloud, blank, cloud[:127], cloud])
+        assert first.state is not None
+        assert first.probabilities == last.probabilities == asked(cloud).probabilities
+        assert (empty.state, empty.points, few.state, few.points) == (None, 0, None, 0)
+        assert empty.reason == "nothing was measured: all points are NaN or infinite"
+        assert few.reason == "too few points: 127 measured, at least 128 are needed"
+    assert predictor.batch([]) == []
+
+
+def test_a_batch_in_another_unit_is_an_error(predictor: Predictor) -> None:
+    cloud = np.random.default_rng(0).uniform(1, 3, (200, 3)).astype(np.float32)
+    with pytest.raises(CloudContentError, match="millimetres"):
+        predictor.batch([cloud, cloud * 1000])
 
 
 @pytest.mark.parametrize(

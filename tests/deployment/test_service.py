@@ -201,7 +201,7 @@ def test_frame_units_and_camera_mean_what_they_mean_to_the_command(client: httpx
         ("format=stl", NPY, 415, r"say \?format= and one of pcd, ply"),
         ("filename=cloud", NPY, 415, "unknown type"),
         ("", NPY, 415, "unknown type"),
-        ("format=npy", bytes_of(CLOUD * np.nan), 422, "all are NaN"),
+        ("format=npy", bytes_of(CLOUD * np.nan), 422, "all points are NaN"),
         ("format=npy", bytes_of(CLOUD[:0]), 422, "holds no points"),
         ("format=npy", bytes_of(CLOUD * 1000), 422, "millimetres\\? say units mm"),
         ("format=xyz", b"1 2 3\n" * 20_000, 413, "more than 0.0953674 MB"),

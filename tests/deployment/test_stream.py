@@ -192,13 +192,15 @@ def test_a_last_frame_that_disagrees_puts_it_off() -> None:
     assert wait_for("open", frames(*held, (1, says(CLOSED)), (4, says(OPEN))), 60.0)
 
 
-def test_clouds_go_through_the_predictor_and_unusable_ones_are_no_answer() -> None:
+def test_clouds_go_through_the_predictor_and_wrong_ones_are_its_error() -> None:
     asked: list[int] = []
 
     def predictor(cloud: Points) -> Prediction:
         asked.append(len(cloud))
         if len(cloud) == 0:
-            raise CloudContentError("the cloud is empty: it holds no points")
+            return UNKNOWN
+        if len(cloud) == 1:
+            raise CloudContentError("half of the points are more than 1000 m away: millimetres?")
         return says(OPEN)
 
     empty, some = np.zeros((0, 3), np.float32), np.ones((5, 3), np.float32)
@@ -206,6 +208,8 @@ def test_clouds_go_through_the_predictor_and_unusable_ones_are_no_answer() -> No
     assert wait_for("open", stream, 10.0, predictor=predictor)
     assert set(asked) == {0, 5}
     assert not wait_for("open", [(number / 10, empty) for number in range(40)], 10.0, predictor=predictor)
+    with pytest.raises(CloudContentError, match="millimetres"):
+        wait_for("open", [(0.0, some), (0.1, some[:1])], 10.0, predictor=predictor)
 
 
 def test_a_state_that_does_not_exist_is_an_error() -> None:

@@ -131,7 +131,7 @@ def test_missing_data_are_never_open(predictor: Predictor, clouds: list[Points])
     assert reports[24].is_open
     assert not any(report.is_open for report in reports[25:])
     assert {report.values["raw_state"] for report in reports[25:]} == {"unknown"}
-    assert "all are NaN" in reports[25].values["reason"]
+    assert "all points are NaN" in reports[25].values["reason"]
     # The filter alone would remember for two to three seconds; from silence_s on the state itself is unknown.
     assert [report.state for report in reports[25:]] == ["open"] * 9 + ["unknown"] * 3
 

@@ -234,7 +234,7 @@ def test_nothing_measured_is_unknown_at_once_and_silence_too(robot: Robot, cloud
     blind = robot.answers("unknown")[0]
     assert stamp_of(blind.header) in sent
     assert blind.status[0].level == DiagnosticStatus.WARN
-    assert "all are NaN" in blind.status[0].message
+    assert "all points are NaN" in blind.status[0].message
     robot.until(lambda: robot.heard["open"][-1].data is False, "word that the way is not free")
     robot.until(lambda: robot.heard["answer"][-1].status[0].level == DiagnosticStatus.STALE, "silence")
     assert values(robot.heard["answer"][-1])["reason"] == "no message for 0.8 s"

@@ -27,7 +27,7 @@ from doorstate.cli.options import (
     read_options,
 )
 from doorstate.cli.predictions import table_cells
-from doorstate.deployment.answers import described
+from doorstate.deployment.answers import described_file
 from doorstate.errors import ConfigError, DoorstateError, MissingExtraError
 
 if TYPE_CHECKING:
@@ -156,6 +156,6 @@ def _answer(predictor: Any, path: Path, options: ReadOptions) -> dict[str, Any]:
     # A name may hold bytes that are no text, which cannot be printed.
     file = {"file": str(path).encode(errors="backslashreplace").decode()}
     try:
-        return file | described(predictor(read_cloud(path, options)))
+        return file | described_file(predictor(read_cloud(path, options)))
     except DoorstateError as error:
         return file | {"error": str(error).removeprefix(f"{path.name}: ")}

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from doorstate.clouds.sampling import farthest_point_indices
-from doorstate.errors import CloudContentError
+from doorstate.errors import CloudContentError, TooFewPointsError
 from doorstate.types import Indices, Points
 
 NUM_POINTS = 4096  # the paper's cloud size
@@ -54,7 +54,8 @@ def prepare_cloud(
             network has never seen, such as the end of a corridor, would take most of its points.
 
     Raises:
-        CloudContentError: of another form, empty, nothing measured, too few points, or units that cannot be metres.
+        CloudContentError: of another form, or units that cannot be metres.
+        TooFewPointsError: empty, nothing measured, or fewer than 128 distinct points.
     """
     points = check_form(points)
     if thin:
@@ -63,29 +64,26 @@ def prepare_cloud(
         return PreparedCloud(prepared.points, pixels[prepared.indices])
     flat = np.asarray(points, dtype=np.float32).reshape(-1, 3)
     if len(flat) == 0:
-        raise CloudContentError("the cloud is empty: it holds no points")
+        raise TooFewPointsError("the cloud is empty: it holds no points")
     measured = np.flatnonzero(is_measured(flat))
     if len(measured) == 0:
-        returned = np.count_nonzero((np.abs(flat) < _NO_RETURN).all(axis=1))
-        if returned == 0:
-            raise CloudContentError(f"none of the {len(flat)} points was measured: all are NaN or infinite")
-        raise CloudContentError(
-            f"all {returned} measured points lie at the origin: the cloud holds no surface"
-        )
+        if not (np.abs(flat) < _NO_RETURN).all(axis=1).any():
+            raise TooFewPointsError("nothing was measured: all points are NaN or infinite")
+        raise TooFewPointsError("all measured points lie at the origin: the cloud holds no surface")
     clean = flat[measured]
     if len(clean) < MIN_POINTS:
-        raise CloudContentError(f"too few points: {len(clean)} measured, at least {MIN_POINTS} are needed")
+        raise TooFewPointsError(f"too few points: {len(clean)} measured, at least {MIN_POINTS} are needed")
     _check_units(clean)
     if max_depth_m is not None:
         measured = measured[clean[:, 0] <= max_depth_m]
         clean = flat[measured]
         if len(clean) < MIN_POINTS:
-            raise CloudContentError(
+            raise TooFewPointsError(
                 f"too few points: {len(clean)} within {max_depth_m:g} m, at least {MIN_POINTS} are needed"
             )
     chosen = _without_repeats(farthest_point_indices(clean, min(count, len(clean))))
     if len(chosen) < min(count, MIN_POINTS):
-        raise CloudContentError(
+        raise TooFewPointsError(
             f"too few points: {len(chosen)} distinct of {len(clean)} measured, at least {MIN_POINTS} are needed"
         )
     return PreparedCloud(clean[chosen], measured[chosen])

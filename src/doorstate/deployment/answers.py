@@ -5,6 +5,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from doorstate.errors import TooFewPointsError
+
 if TYPE_CHECKING:
     from doorstate.deployment.predictor import Prediction
 
@@ -23,6 +25,17 @@ def described(prediction: Prediction) -> dict[str, Any]:
             if value is not None
         },
     }
+
+
+def described_file(prediction: Prediction) -> dict[str, Any]:
+    """A prediction of a file as JSON takes it; one without points is broken, where a frame of a stream is unknown.
+
+    Raises:
+        TooFewPointsError: there was nothing to look at.
+    """
+    if prediction.points == 0:
+        raise TooFewPointsError(prediction.reason)
+    return described(prediction)
 
 
 FURTHER = (

@@ -35,8 +35,11 @@ class Gate:
     Args:
         min_points: fewer measured points are refused; those of the largest neighbourhood of a network.
         min_measured_share: of all pixels or rows; chosen: half of the emptiest simulated frames'.
+        max_behind_share: of the measured points; chosen: a camera sees none, a scan or a cloud in another frame a half.
         min_median_range_m: half of the points must be farther; chosen: nearer than any simulated frame's median,
             and an arm's length.
+        max_median_range_m: half of the points must be nearer; chosen: 1.5 times the largest of simulated and
+            recorded frames with a door.
         min_extent_m: of the middle nine tenths of the points, in height and across; chosen: half a door's width,
             which a floor or a hand alone does not have.
         min_view_deg: across, between the outermost rays; chosen: half an image with a lens of 60 degrees shows 30, an
@@ -53,7 +56,9 @@ class Gate:
 
     min_points: int = MIN_POINTS
     min_measured_share: float = 0.25
+    max_behind_share: float = 0.05
     min_median_range_m: float = 0.6
+    max_median_range_m: float = 5.4
     min_extent_m: float = 0.45
     min_view_deg: float = 40.0
     hole_height_share: float = 0.2
@@ -67,7 +72,13 @@ class Gate:
         Raises:
             ConfigError: a share below 0 or above 1, or margins that leave no column.
         """
-        for name in ("min_measured_share", "hole_height_share", "max_hole_share", "margin_share"):
+        for name in (
+            "min_measured_share",
+            "max_behind_share",
+            "hole_height_share",
+            "max_hole_share",
+            "margin_share",
+        ):
             if not 0 <= getattr(self, name) <= 1:
                 raise ConfigError(f"gate: {name} {getattr(self, name)}: a share is from 0 to 1")
         if self.margin_share > 0.4:
@@ -96,9 +107,14 @@ class Gate:
         if share < self.min_measured_share:
             return f"only {share:.0%} of the cloud was measured: at least {self.min_measured_share:.0%} are needed"
         some = points[:: max(1, len(points) // 8192)].astype(np.float64)
+        share = float((some[:, 0] < 0).mean())
+        if share > self.max_behind_share:
+            return f"{share:.0%} of the points lie behind the camera: a scan, or a cloud in another frame"
         median_m = float(np.median(np.linalg.norm(some, axis=1)))
         if median_m < self.min_median_range_m:
             return f"half of the points are within {median_m:.2f} m: something is before the camera"
+        if median_m > self.max_median_range_m:
+            return f"half of the points are beyond {median_m:.1f} m: too far away for a door"
         low, high = np.quantile(some, (0.05, 0.95), axis=0)
         across_m, height_m = float((high - low)[:2].max()), float((high - low)[2])
         if min(across_m, height_m) < self.min_extent_m:

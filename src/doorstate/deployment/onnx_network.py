@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from doorstate.clouds.preparation import centroids
-from doorstate.errors import CloudContentError, MissingExtraError, WeightsError, one_line
+from doorstate.errors import MissingExtraError, WeightsError, one_line
 from doorstate.training.answers import Columns, in_metres
 from doorstate.training.card import WeightsCard
 from doorstate.types import PARTS, STATES, Points
@@ -70,14 +70,9 @@ class OnnxNetwork:
     def ask(self, points: Points) -> tuple[NDArray[np.float32], Columns]:
         """Probabilities (B, 3), and what further heads say, (B,) each, of (B, n, 3) metres in farthest-point order.
 
-        Raises:
-            CloudContentError: n is not the number of points that the file takes.
+        Args:
+            points: n is as many as the file was exported for.
         """
-        if points.shape[1] != self.card.num_points:
-            raise CloudContentError(
-                f"too few points: {points.shape[1]} distinct, but the .onnx file takes {self.card.num_points}: "
-                "export it again with fewer --points"
-            )
         answer, *heads = self._session.run([OUTPUT, *self._heads], {INPUT: points})
         return answer, in_metres(dict(zip(self._heads, heads, strict=True)), centroids(points))
 

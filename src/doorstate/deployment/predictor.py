@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from doorstate.clouds.preparation import NUM_POINTS, PreparedCloud, prepare_cloud
 from doorstate.deployment.gate import Gate
 from doorstate.deployment.onnx_network import OnnxNetwork
-from doorstate.errors import ConfigError, MissingExtraError, WeightsError
+from doorstate.errors import ConfigError, MissingExtraError, TooFewPointsError, WeightsError
 from doorstate.rules.base import Shape
 from doorstate.training.card import WeightsCard
 from doorstate.types import STATES, DoorState, Points
@@ -169,13 +169,13 @@ class Predictor:
         return f"{self.card.network}, {self.points} points"
 
     def __call__(self, points: Points) -> Prediction:
-        """State of the door in a cloud, or none with the reason: the gate's, no door, or too little certainty.
+        """State of the door in a cloud, or none with the reason: too few points, the gate's, no door, or unsure.
 
         Args:
             points: (N, 3) or organized (H, W, 3) metres, x forward, y left, z up, NaN where nothing was measured.
 
         Raises:
-            CloudContentError: the cloud cannot be used (clouds.preparation says when).
+            CloudContentError: no cloud, or not in metres (clouds.preparation says when).
         """
         return self.batch([points])[0]
 
@@ -189,23 +189,22 @@ class Predictor:
             One prediction for each, in their order; its milliseconds are an equal share of the time for all.
 
         Raises:
-            CloudContentError: one of the clouds cannot be used.
+            CloudContentError: one of the clouds is none, or not in metres.
         """
         started = self.clock()
-        prepared = [self.prepare(cloud) for cloud in clouds]
-        reasons = [None if self.gate is None else self.gate(cloud) for cloud in clouds]
-        asked = [number for number, reason in enumerate(reasons) if reason is None]
+        looks = [self._look(cloud) for cloud in clouds]
+        asked = [number for number, (_, refused) in enumerate(looks) if refused is None]
         said: dict[int, _Said] = {}
-        for count in sorted({len(prepared[number].points) for number in asked}):
-            alike = [number for number in asked if len(prepared[number].points) == count]
-            probabilities, columns = self._ask(np.stack([prepared[number].points for number in alike]))
+        for count in sorted({len(looks[number][0]) for number in asked}):
+            alike = [number for number in asked if len(looks[number][0]) == count]
+            probabilities, columns = self._ask(np.stack([looks[number][0] for number in alike]))
             for place, number in enumerate(alike):
                 told = {name: float(values[place]) for name, values in columns.items()}
                 said[number] = _Said(probabilities[place], told)
         milliseconds = (self.clock() - started) * 1000 / max(1, len(clouds))
         return [
-            self._prediction(said.get(number), len(cloud.points), milliseconds, reasons[number])
-            for number, cloud in enumerate(prepared)
+            self._prediction(said.get(number), len(points), milliseconds, refused)
+            for number, (points, refused) in enumerate(looks)
         ]
 
     def prepare(self, points: Points) -> PreparedCloud:
@@ -213,8 +212,23 @@ class Predictor:
 
         Raises:
             CloudContentError: as for a call.
+            TooFewPointsError: there are not enough.
         """
-        return prepare_cloud(points, self.points, thin=self.thin, max_depth_m=self.card.max_depth_m)
+        prepared = prepare_cloud(points, self.points, thin=self.thin, max_depth_m=self.card.max_depth_m)
+        if isinstance(self.network, OnnxNetwork) and len(prepared.points) < self.points:
+            raise TooFewPointsError(
+                f"too few points: {len(prepared.points)} distinct, but the .onnx file takes {self.points}: "
+                "export it again with fewer --points"
+            )
+        return prepared
+
+    def _look(self, cloud: Points) -> tuple[Points, str | None]:
+        """Points to ask about, and why nobody may be asked."""
+        try:
+            points = self.prepare(cloud).points
+        except TooFewPointsError as error:
+            return np.empty((0, 3), np.float32), str(error)
+        return points, None if self.gate is None else self.gate(cloud)
 
     def _prediction(
         self, said: _Said | None, points: int, milliseconds: float, refused: str | None

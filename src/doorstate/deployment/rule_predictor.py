@@ -11,7 +11,6 @@ import numpy as np
 from doorstate.clouds.preparation import check_form
 from doorstate.deployment.gate import Gate
 from doorstate.deployment.predictor import DEFAULT_GATE, Prediction
-from doorstate.errors import CloudContentError
 from doorstate.rules import create_rule
 from doorstate.rules.base import Answer, Rule, measured
 from doorstate.types import STATES, Points
@@ -52,13 +51,13 @@ class RulePredictor:
             points: (N, 3) or organized (H, W, 3) metres, x forward, y left, z up, NaN where nothing was measured.
 
         Raises:
-            CloudContentError: nothing was measured.
+            CloudContentError: no cloud.
         """
         started = time.perf_counter()
         points = check_form(points)
         count = len(measured(points))
         if count == 0:
-            raise CloudContentError("nothing was measured: the cloud holds no points")
+            return Prediction.none("nothing was measured: the cloud holds no points")
         refused = None if self.gate is None else self.gate(points)
         answer = self.rule(np.asarray(points)) if refused is None else Answer.none(refused)
         return Prediction(

@@ -19,7 +19,7 @@ from starlette.requests import ClientDisconnect
 from doorstate import __version__
 from doorstate.clouds.depth import ROLLS_DEG
 from doorstate.clouds.io import CLOUD_SUFFIXES, UNITS_M, ReadOptions, options_from_flags, parse_cloud
-from doorstate.deployment.answers import described
+from doorstate.deployment.answers import described_file
 from doorstate.deployment.lingering import LingeringClose
 from doorstate.deployment.predictor import Predictor
 from doorstate.deployment.workload import Limits, Workload
@@ -176,7 +176,7 @@ def create_app(predictor: Predictor, limits: Limits | None = None) -> FastAPI:
     async def predict(request: Request, query: Annotated[FileQuery, Query()]) -> dict[str, Any]:
         options, suffix = _options(query), _suffix(query, request.headers.get("content-type", ""))
         return await workload.answer(
-            request, lambda file: described(predictor(parse_cloud(file, suffix, options)))
+            request, lambda file: described_file(predictor(parse_cloud(file, suffix, options)))
         )
 
     return app

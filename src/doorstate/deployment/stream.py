@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from doorstate.deployment.predictor import Prediction, Predictor
-from doorstate.errors import CloudContentError, ConfigError
+from doorstate.errors import ConfigError
 from doorstate.types import STATES, DoorState, Points
 
 
@@ -159,6 +159,7 @@ def wait_for(
 
     Raises:
         ConfigError: no such state, seconds below zero, or a stamp that is not finite.
+        CloudContentError: as of the predictor.
     """
     wanted = DoorState[state.upper()] if isinstance(state, str) and state in STATES else state
     if not isinstance(wanted, DoorState):
@@ -174,7 +175,7 @@ def wait_for(
             prediction = frame
         else:
             predictor = predictor or Predictor.load()
-            prediction = _prediction(predictor, frame)
+            prediction = predictor(frame)
         filtered = state_filter.update(prediction, stamp_s)
         waited_s += max(0.0, stamp_s - last_s) if last_s is not None else 0.0
         last_s = stamp_s
@@ -184,10 +185,3 @@ def wait_for(
         if prediction.state == wanted and held_s is not None and held_s >= hold_s:
             return True
     return False
-
-
-def _prediction(predictor: Callable[[Points], Prediction], cloud: Points) -> Prediction:
-    try:
-        return predictor(cloud)
-    except CloudContentError as error:
-        return Prediction.none(str(error))
