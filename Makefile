@@ -2,6 +2,7 @@
 # make test-ros2: the ROS 2 node, live, with ROS from PyPI in an environment of its own.
 # make docs: the site, in build/site; make fresh-install: the wheel as a new user gets it, timed.
 # make reproduce: the paper's comparison from nothing (EXPERIMENT=by-pose, authors, resolution, weights: those);
+# make publish: what EXPERIMENT gave, and all that follows from it, into results/ and docs/;
 # make reproduce-check: are all published tables and figures what the committed predictions give?
 VENV := .venv
 BIN := $(VENV)/bin
@@ -9,7 +10,7 @@ DEMO := demo
 
 EXPERIMENT := paper
 
-.PHONY: setup check test test-ros2 docs demo fresh-install reproduce reproduce-check lock clean
+.PHONY: setup check test test-ros2 docs demo fresh-install reproduce publish reproduce-check lock clean
 
 setup: $(VENV)/.complete
 
@@ -41,6 +42,10 @@ demo: setup
 
 reproduce: setup
 	$(BIN)/python tools/reproduce.py run $(EXPERIMENT)
+
+publish: setup
+	$(BIN)/python tools/reproduce.py publish $(EXPERIMENT)
+	$(BIN)/python tools/reproduce.py build
 
 reproduce-check: setup
 	$(BIN)/python tools/reproduce.py check

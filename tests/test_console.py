@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import io
+import time
 from pathlib import Path
 
 import pytest
@@ -69,6 +70,17 @@ def test_where_nobody_looks_finished_runs_are_counted(
     with console.live_runs([Run("dgcnn", 0, begun(tmp_path))], RECIPES, 512, 1) as progress:
         progress(1, 4)
     assert capsys.readouterr().err == "1 of 4 runs finished, about 6 min left\n"
+
+
+def test_a_log_hears_of_long_runs_before_they_end(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(console, "_LINE_EVERY_S", 0.01)
+    with console.live_runs([Run("dgcnn", 0, begun(tmp_path))], RECIPES, 512, 1):
+        time.sleep(0.1)
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) > 1
+    assert set(lines) == {"0 of 1 runs finished, about 6 min left"}
 
 
 def test_a_run_that_tested_nothing_is_done(tmp_path: Path) -> None:

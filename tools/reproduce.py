@@ -54,6 +54,7 @@ def run(name: str) -> None:
     _doorstate("simulate --preset ogurob --out data/ogurob")
     _doorstate("prepare data/ogurob --out data/ogurob-4096")
     if name == "resolution":
+        _doorstate("compare experiments/paper.toml --jobs 2")  # it begins with those weights
         _doorstate(f"resolution experiments/{name}.toml --jobs 2")
         return
     _doorstate(f"compare experiments/{name}.toml --jobs 2")

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import sys
+import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 _PLAIN: dict[str, Any] = {"highlight": False, "markup": False, "emoji": False}
 out = Console(**_PLAIN)
 err = Console(stderr=True, **_PLAIN)
+_LINE_EVERY_S = 600.0  # where nobody looks, but somebody may read a log
 
 
 @contextmanager
@@ -69,7 +71,7 @@ def live_runs(
 ) -> Iterator[Callable[[int, int], None]]:
     """Show how far every run is, read from the run folders once a second; yields `update(done, total)`.
 
-    Where nobody looks, finished runs are counted in plain lines instead.
+    Where nobody looks, finished runs are counted in plain lines instead, and every ten minutes.
     """
     watch = _RunWatch(runs, recipes, num_points, jobs)
     if not err.is_terminal:
@@ -77,10 +79,28 @@ def live_runs(
         def say(done: int, total: int) -> None:
             err.print(f"{done} of {total} runs finished{watch.time_left()}", soft_wrap=True)
 
-        yield say
+        with _every(_LINE_EVERY_S, lambda: say(sum(run.folder.finished for run in runs), len(runs))):
+            yield say
         return
     with Live(get_renderable=watch.table, console=err, refresh_per_second=1):
         yield lambda done, total: None
+
+
+@contextmanager
+def _every(seconds: float, act: Callable[[], None]) -> Iterator[None]:
+    over = threading.Event()
+
+    def keep_acting() -> None:
+        while not over.wait(seconds):
+            act()
+
+    thread = threading.Thread(target=keep_acting, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
 
 
 class _RunWatch:
