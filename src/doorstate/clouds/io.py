@@ -108,7 +108,7 @@ def options_from_flags(
     return ReadOptions(frame, roll, camera, depth_scale, UNITS_M[units])  # type: ignore[arg-type]
 
 
-def read_cloud(path: Path, options: ReadOptions = DEFAULT_OPTIONS) -> Points:
+def read_cloud(path: str | Path, options: ReadOptions = DEFAULT_OPTIONS) -> Points:
     """Read one file, chosen by its suffix, as points in the body frame.
 
     Args:
@@ -122,6 +122,7 @@ def read_cloud(path: Path, options: ReadOptions = DEFAULT_OPTIONS) -> Points:
         CloudReadError: when the file cannot be read as what its suffix says.
         CameraError: when a depth image lacks intrinsics or they are for another image size.
     """
+    path = Path(path)
     try:
         if path.is_dir():
             raise CloudReadError("is a folder, not a file")
