@@ -42,6 +42,7 @@ def test_answers_are_those_of_the_rule_on_raw_frames(doors: PreparedDataset, tmp
         assert row["predicted"] == (NO_ANSWER if expected.state is None else expected.state.label)
         assert row["reason"] == expected.reason
         assert (row["opening_angle_deg"] == "") == (expected.opening_angle_deg is None)
+        assert row["open_or_not"] == {None: "", True: "open", False: "not_open"}[expected.open_or_not]
         assert sum(float(row[f"p_{state}"]) for state in STATES) == (expected.state is not None)
     oracle = f1_score(
         [row["state"] for row in rows],

@@ -59,6 +59,9 @@ class Predictions:
     probabilities: Floats  # (N, 3)
     angles_deg: Floats  # (N,) opening angles a rule gave, NaN where it gave none
     reasons: tuple[str, ...] = ()  # N reasons for no answer, or none at all
+    open_or_not: tuple[
+        str, ...
+    ] = ()  # N, of rules that tell `open` from `not_open` and no more; or none at all
 
     @property
     def right(self) -> NDArray[np.bool_]:
@@ -151,6 +154,7 @@ class ComparisonResults:
             np.concatenate([part.probabilities for part in parts]),
             np.concatenate([part.angles_deg for part in parts]),
             tuple(reason for part in parts for reason in part.reasons),
+            tuple(answer for part in parts for answer in part.open_or_not),
         )
 
     def answers(self, network: str) -> Answers | None:
@@ -279,8 +283,9 @@ def _read_predictions(path: Path, fold: int) -> Predictions:
         raise RunError(f"{path}: a probability is not finite; train this run again")
     sample_ids = tuple(row["sample_id"] for row in rows)
     reasons = tuple(row["reason"] for row in rows if "reason" in row)
+    told = tuple(row["open_or_not"] for row in rows if "open_or_not" in row)
     return Predictions(
-        sample_ids, np.full(len(rows), fold), true, predicted, probabilities, angles_deg, reasons
+        sample_ids, np.full(len(rows), fold), true, predicted, probabilities, angles_deg, reasons, told
     )
 
 

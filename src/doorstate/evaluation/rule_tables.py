@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rules say besides the state: opening angles against the truth (heads may say them too), and why no answer."""
+"""What rules say besides the state, or in its place: opening angles (heads may say them too), open or not, why not."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ import numpy as np
 
 from doorstate.dataset.store import PreparedDataset
 from doorstate.dataset.strata import REGIONS
-from doorstate.evaluation.metrics import Floats
+from doorstate.evaluation.metrics import Floats, ratio
 from doorstate.evaluation.results import ComparisonResults
 from doorstate.evaluation.stratum_tables import rows_of
 from doorstate.evaluation.table import Table, number
 from doorstate.simulation.manifest import numbers
 from doorstate.types import STATES
 
-_CLOSED = STATES.index("closed")
+_CLOSED, _OPEN = STATES.index("closed"), STATES.index("open")
 
 
 def angle_table(results: ComparisonResults, dataset: PreparedDataset) -> Table:
@@ -41,6 +41,29 @@ def angle_table(results: ComparisonResults, dataset: PreparedDataset) -> Table:
         tuple(rows),
         "Semi-open and open doors. The simulator knows the angle; where a method gave none, it is not counted.",
         text_columns=2,
+    )
+
+
+def open_table(results: ComparisonResults) -> Table:
+    """Open or not, of every method, where a rule tells that and no more; no answer is neither."""
+    pooled = {method: results.pooled(method) for method in results.networks}
+    rows = []
+    for method, predictions in pooled.items():
+        if any(predictions.open_or_not):
+            answered = np.array([answer != "" for answer in predictions.open_or_not])
+            said_open = np.array([answer == "open" for answer in predictions.open_or_not])
+        else:
+            answered, said_open = predictions.predicted < len(STATES), predictions.predicted == _OPEN
+        is_open = predictions.true == _OPEN
+        hits = (said_open & is_open).sum()
+        right = hits + (answered & ~said_open & ~is_open).sum()
+        shares = ratio((hits, hits, right), (is_open.sum(), said_open.sum(), len(predictions)))
+        rows.append((method, *(number(float(share)) for share in shares), str((~answered).sum())))
+    return Table(
+        "Open or not",
+        ("method", "recall of open", "precision of open", "accuracy", "no answer"),
+        tuple(rows) if any(any(each.open_or_not) for each in pooled.values()) else (),
+        "Closed and semi-open are both not open. No answer is wrong.",
     )
 
 

@@ -13,7 +13,7 @@ from doorstate.evaluation.factors import factors_table, kinds_table
 from doorstate.evaluation.head_tables import answers_table, parts_table, presence_table
 from doorstate.evaluation.metrics import confusion_matrix, scores
 from doorstate.evaluation.results import ComparisonResults
-from doorstate.evaluation.rule_tables import angle_table, reasons_table
+from doorstate.evaluation.rule_tables import angle_table, open_table, reasons_table
 from doorstate.evaluation.score_tables import (
     confusion_table,
     folds_table,
@@ -61,6 +61,7 @@ def build_tables(results: ComparisonResults, dataset: PreparedDataset) -> dict[s
         **_filled(
             {
                 "angle_errors": angle_table(results, dataset),
+                "open_or_not": open_table(results),
                 "reasons": reasons_table(results),
                 "factors": factors_table(results, dataset),
                 "kinds": kinds_table(results, dataset),

@@ -24,6 +24,7 @@ from doorstate.training.run_folder import RunFolder
 from doorstate.types import NO_ANSWER, NO_DOOR, STATES
 
 _TELL_EVERY_S = 1.0
+_OPEN_OR_NOT = ("not_open", "open")
 
 
 class RuleRunConfig(Frozen):
@@ -41,8 +42,8 @@ def answer(
 ) -> dict[str, Any]:
     """Answer the test samples of a fold from their raw clouds; a finished run is returned as it is.
 
-    Predictions have more columns than a network's: reason, opening_angle_deg, opening_width_m. What was found where the
-    answer is not right is kept in `found.jsonl`, for the report to draw.
+    Predictions have more columns than a network's: reason, opening_angle_deg, opening_width_m, open_or_not. What was
+    found where the answer is not right is kept in `found.jsonl`, for the report to draw.
 
     Raises:
         DatasetError: no sample is tested.
@@ -103,6 +104,7 @@ def _row(sample: str, state: str, answer: Answer) -> dict[str, str]:
         "reason": answer.reason,
         "opening_angle_deg": _number(answer.opening_angle_deg),
         "opening_width_m": _number(answer.opening_width_m),
+        "open_or_not": "" if answer.open_or_not is None else _OPEN_OR_NOT[answer.open_or_not],
     }
 
 
