@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Real bags for tests, written with rosbags."""
+"""Real bags for tests and the fuzzer, written with rosbags."""
 
 from __future__ import annotations
 

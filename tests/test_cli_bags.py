@@ -14,7 +14,8 @@ import pytest
 
 pytest.importorskip("rosbags")
 
-from bag_writer import START_NS, Message, camera_info, cloud, image, write_bag
+from benchmarks.bags import START_NS, Message, camera_info, cloud, image, write_bag
+
 from doorstate.networks import create_network
 from doorstate.training.weights import WeightsCard, save_weights
 from doorstate.types import STATES

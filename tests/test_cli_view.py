@@ -105,7 +105,7 @@ def test_a_large_page_is_said_to_be_large(
 
 def test_bags_are_shown_too(view: Run, tmp_path: Path) -> None:
     pytest.importorskip("rosbags")
-    from bag_writer import START_NS, cloud, write_bag
+    from benchmarks.bags import START_NS, cloud, write_bag
 
     messages = [cloud("/points", CLOUD, START_NS + k * 10**9) for k in range(3)]
     for message in messages:
@@ -163,7 +163,7 @@ def test_a_folder_is_shown_live_until_ctrl_c(view: Run, folder: Path, opened: li
 
 def test_a_bag_is_shown_live_to_its_end(view: Run, tmp_path: Path) -> None:
     pytest.importorskip("rosbags")
-    from bag_writer import START_NS, cloud, write_bag
+    from benchmarks.bags import START_NS, cloud, write_bag
 
     bag = write_bag(tmp_path, "db3", [cloud("/points", CLOUD, START_NS + k * 10**7) for k in range(4)])
     (code, _, _), heard = live(view, "event: end", "--bag", bag, "--every", 2, "--no-open")
