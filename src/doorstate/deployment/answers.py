@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from doorstate.errors import TooFewPointsError
@@ -19,11 +20,7 @@ def described(prediction: Prediction) -> dict[str, Any]:
         "points": prediction.points,
         "milliseconds": round(prediction.milliseconds, 3),
         **({"reason": prediction.reason} if prediction.state is None else {}),
-        **{
-            name: value
-            for name, value in zip(FURTHER, _further(prediction), strict=True)
-            if value is not None
-        },
+        **{name: told for name, tell in FURTHER.items() if (told := tell(prediction)) is not None},
     }
 
 
@@ -38,32 +35,18 @@ def described_file(prediction: Prediction) -> dict[str, Any]:
     return described(prediction)
 
 
-FURTHER = (
-    "door_probability",
-    "opening_angle_deg",
-    "hinge",
-    "door_x_m",
-    "door_y_m",
-    "door_yaw_deg",
-    "opening_width_m",
-    "passable_width_m",
-)
-"""What some methods say besides the state."""
-
-
-def _further(prediction: Prediction) -> tuple[float | str | None, ...]:
-    frame = prediction.frame
-    return (
-        _rounded(prediction.door_probability, 4),
-        _rounded(prediction.opening_angle_deg, 1),
-        prediction.hinge,
-        None if frame is None else round(frame.x_m, 3),
-        None if frame is None else round(frame.y_m, 3),
-        None if frame is None else round(frame.yaw_deg, 1),
-        _rounded(prediction.opening_width_m, 3),
-        _rounded(prediction.passable_width_m, 3),
-    )
-
-
 def _rounded(value: float | None, digits: int) -> float | None:
     return None if value is None else round(value, digits)
+
+
+FURTHER: dict[str, Callable[[Prediction], float | str | None]] = {
+    "door_probability": lambda said: _rounded(said.door_probability, 4),
+    "opening_angle_deg": lambda said: _rounded(said.opening_angle_deg, 1),
+    "hinge": lambda said: said.hinge,
+    "door_x_m": lambda said: said.frame and round(said.frame.x_m, 3),
+    "door_y_m": lambda said: said.frame and round(said.frame.y_m, 3),
+    "door_yaw_deg": lambda said: said.frame and round(said.frame.yaw_deg, 1),
+    "opening_width_m": lambda said: _rounded(said.opening_width_m, 3),
+    "passable_width_m": lambda said: _rounded(said.passable_width_m, 3),
+}
+"""What some methods say besides the state."""
