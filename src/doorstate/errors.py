@@ -77,6 +77,11 @@ class MissingExtraError(DoorstateError):
     """An optional package is needed and not installed."""
 
 
+def not_installed(what: str, *packages: str) -> MissingExtraError:
+    """What cannot be done, and how it can: by the packages' own names, as doorstate is on no index."""
+    return MissingExtraError(f"{what} needs what is not installed: pip install {' '.join(packages)}")
+
+
 def first_problem(error: ValidationError) -> str:
     """Where the first problem of values lies, if not in the whole, and what it is."""
     problem = error.errors()[0]

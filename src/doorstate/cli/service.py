@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 
 from doorstate.cli.options import Network, PointCount, Weights
-from doorstate.errors import ConfigError, MissingExtraError
+from doorstate.errors import ConfigError, not_installed
 
 
 def serve(
@@ -46,9 +46,7 @@ def serve(
         from doorstate.deployment.service import create_app
         from doorstate.deployment.workload import Limits
     except ImportError as error:
-        raise MissingExtraError(
-            'serve needs the packages fastapi and uvicorn: pip install "doorstate[serve]"'
-        ) from error
+        raise not_installed("serve", "fastapi", "uvicorn") from error
     from doorstate.deployment.predictor import Predictor
     from doorstate.jobs import default_workers
     from doorstate.training.environment import keep_freed_memory

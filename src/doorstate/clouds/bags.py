@@ -26,7 +26,7 @@ from doorstate.clouds.messages import (
     points_from_message,
     stamp_ns_of,
 )
-from doorstate.errors import CameraError, CloudReadError, DoorstateError, MissingExtraError, one_line
+from doorstate.errors import CameraError, CloudReadError, DoorstateError, not_installed, one_line
 from doorstate.types import Points
 
 _COMPRESSED_DEPTH = "/compressedDepth"  # how image_transport ends the names of such topics
@@ -62,7 +62,7 @@ def open_bag(path: Path) -> Iterator[Bag]:
         from rosbags.rosbag2 import Reader as Reader2
         from rosbags.typesys import Stores, get_typestore
     except ImportError as error:
-        raise MissingExtraError('ROS bags need the package rosbags: pip install "doorstate[bags]"') from error
+        raise not_installed("a ROS bag", "rosbags") from error
     if not path.exists():
         raise CloudReadError(f"{path}: no such file or folder")
     if path.is_dir() and not (path / "metadata.yaml").is_file():

@@ -9,6 +9,7 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -21,7 +22,7 @@ from doorstate import __version__
 from doorstate.clouds.preparation import SCALE_M, prepare_cloud
 from doorstate.deployment.onnx_network import CARD, INPUT, OUTPUT, OnnxNetwork, heads_told
 from doorstate.deployment.torch_network import TorchNetwork
-from doorstate.errors import ConfigError, ExportError, MissingExtraError, one_line
+from doorstate.errors import ConfigError, ExportError, not_installed, one_line
 from doorstate.files import atomic_path
 from doorstate.jobs import Progress, no_progress
 from doorstate.networks.base import PointNetwork
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
 
 OPSET = 18  # what torch's exporter is written in; newer ones are converted from it
 TOLERANCE = 1e-4  # of a probability
+_PACKAGES = ("onnx", "onnxscript", "onnxruntime")  # torch's exporter asks for the second
 _SEED = 1_000_003  # of clouds that no weights were trained on
 _ANY_SIZE = 2**30  # of a constant
 _JITTERS = 3
@@ -90,6 +92,15 @@ class _Graph(nn.Module):
         return ((said.pop(STATE) / self.temperature).softmax(1), *said.values())
 
 
+def check_installed() -> None:
+    """Raise MissingExtraError unless everything that an export needs is there."""
+    try:
+        for package in _PACKAGES:
+            import_module(package)
+    except ImportError as error:
+        raise not_installed("export", *_PACKAGES) from error
+
+
 def export_onnx(
     path: Path,
     network: PointNetwork,
@@ -112,17 +123,12 @@ def export_onnx(
         progress: of the comparison.
 
     Raises:
-        MissingExtraError: a package of the extra `onnx` is not installed.
+        MissingExtraError: onnx, onnxscript or onnxruntime is not installed.
         ExportError: the network cannot be exported, or the file answers otherwise than torch.
     """
-    try:
-        import onnx
-        import onnxruntime  # noqa: F401 - needed last, and told first
-        import onnxscript  # noqa: F401 - likewise, by torch too
-    except ImportError as error:
-        raise MissingExtraError(
-            f'export needs the package {error.name}: pip install "doorstate[onnx]"'
-        ) from error
+    check_installed()
+    import onnx
+
     num_points = clouds.points.shape[1]
     with atomic_path(path) as temporary:
         with _quiet():

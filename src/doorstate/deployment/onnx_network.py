@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from doorstate.clouds.preparation import centroids
-from doorstate.errors import MissingExtraError, WeightsError, one_line
+from doorstate.errors import WeightsError, not_installed, one_line
 from doorstate.training.answers import Columns, in_metres
 from doorstate.training.card import WeightsCard
 from doorstate.types import PARTS, STATES, Points
@@ -43,9 +43,7 @@ class OnnxNetwork:
         try:
             import onnxruntime
         except ImportError as error:
-            raise MissingExtraError(
-                f'{path.name} needs the package onnxruntime: pip install "doorstate[onnx]"'
-            ) from error
+            raise not_installed(path.name, "onnxruntime") from error
         if not path.is_file():
             raise WeightsError(f"{path}: no such weights file")
         options = onnxruntime.SessionOptions()
