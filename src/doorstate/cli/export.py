@@ -23,7 +23,7 @@ def export(
     int8: Annotated[
         bool, typer.Option("--int8", help="Matrices as 8-bit integers: a smaller file, other probabilities.")
     ] = False,
-    clouds: Annotated[int, typer.Option(help="Simulated clouds to compare with torch on.", min=3)] = 24,
+    clouds: Annotated[int, typer.Option(help="Simulated clouds to compare with torch on.", min=3)] = 100,
 ) -> None:
     """Write a network as ONNX, checked and compared with torch on simulated clouds: points in, probabilities out.
 
@@ -36,13 +36,21 @@ def export(
     """
     from doorstate.console import out as stdout
     from doorstate.console import progress_bar
-    from doorstate.deployment.onnx_export import TOLERANCE, comparison_clouds, export_onnx
+    from doorstate.deployment.onnx_export import (
+        TOLERANCE,
+        check_installed,
+        comparison_clouds,
+        export_onnx,
+    )
     from doorstate.deployment.predictor import packaged_weights
+    from doorstate.networks import network_class
     from doorstate.training.weights import load_weights
 
     path = out or Path(f"{network}{'-int8' if int8 else ''}.onnx")
     if path.suffix != ".onnx":
         raise ConfigError(f"--out {path}: predict knows exported files by the ending .onnx")
+    network_class(network)  # or an error that names those there are
+    check_installed()
     loaded, card = load_weights(weights or packaged_weights(network))
     if card.network != network:
         raise ConfigError(f"{weights}: weights of {card.network}, not of {network}")
