@@ -16,7 +16,7 @@ from doorstate import Predictor, read_cloud
 from doorstate.cli.training import compare_live
 from doorstate.clouds.io import find_clouds
 from doorstate.console import progress_bar
-from doorstate.dataset.prepare import prepare_dataset
+from doorstate.dataset.prepare import Preparation, prepare_dataset
 from doorstate.training.comparison import load_experiment, run_of
 
 
@@ -33,7 +33,9 @@ def main() -> None:
     asked = parser.parse_args()
 
     with progress_bar("Preparing") as progress:
-        prepared = prepare_dataset(asked.clouds, asked.out / "prepared", asked.points, progress=progress)
+        prepared = prepare_dataset(
+            Preparation(asked.clouds, asked.points), asked.out / "prepared", progress=progress
+        )
     for row in prepared.rejected:
         print(f"left out {row['file']}: {row['reason']}")
     experiment = load_experiment(

@@ -14,7 +14,7 @@ from hypothesis import settings
 
 from doorstate.cli import main
 from doorstate.dataset.join import join_datasets
-from doorstate.dataset.prepare import prepare_dataset
+from doorstate.dataset.prepare import Preparation, prepare_dataset
 from doorstate.dataset.store import PreparedDataset
 from doorstate.networks import create_network
 from doorstate.simulation.generate import PRESETS
@@ -52,7 +52,7 @@ def simulated_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def small_dataset(simulated_folder: Path, tmp_path_factory: pytest.TempPathFactory) -> PreparedDataset:
     """The same samples with 160 points each."""
     folder = tmp_path_factory.mktemp("prepared") / "small"
-    return prepare_dataset(simulated_folder, folder, SMALL_POINTS, workers=1).dataset
+    return prepare_dataset(Preparation(simulated_folder, SMALL_POINTS), folder, workers=1).dataset
 
 
 @pytest.fixture(scope="session")
@@ -63,7 +63,7 @@ def scene_dataset(tmp_path_factory: pytest.TempPathFactory) -> PreparedDataset:
     for name, scenes in (("varied", 8), ("no-door", 12)):
         preset = SCENE_PRESETS[name].model_copy(update={"camera": camera})
         simulate_dataset(folder / name, SceneSettings(preset=preset, seed=4, scenes=scenes), workers=1)
-        prepare_dataset(folder / name, folder / f"{name}-160", SMALL_POINTS, workers=1)
+        prepare_dataset(Preparation(folder / name, SMALL_POINTS), folder / f"{name}-160", workers=1)
     return join_datasets([folder / "varied-160", folder / "no-door-160"], folder / "joined")
 
 

@@ -17,7 +17,7 @@ from doorstate.clouds.depth import depth_to_points
 from doorstate.clouds.io import ReadOptions
 from doorstate.dataset.deepdoors2 import CAMERA, deepdoors2_rows, read_deepdoors2
 from doorstate.dataset.layouts import LAYOUTS, find_layout
-from doorstate.dataset.prepare import prepare_dataset
+from doorstate.dataset.prepare import Preparation, prepare_dataset
 from doorstate.errors import CameraError, CloudReadError, ConfigError, DatasetError
 from doorstate.simulation.scene import Door, build_scene
 from doorstate.simulation.sensor import CameraPose, render
@@ -181,7 +181,7 @@ def test_prepare_takes_the_layout(root: Path, tmp_path: Path, run: Run) -> None:
     code, said, err = run(*asked, "--out", out)
     assert (code, err) == (0, "")
     assert "3 clouds of 128 points" in said
-    again = prepare_dataset(part, out, 128, workers=1, layout="deepdoors2").dataset
+    again = prepare_dataset(Preparation(part, 128, layout="deepdoors2"), out, workers=1).dataset
     assert [(row["state"], row["split"]) for row in again.rows] == [
         ("closed", "test"),
         ("open", "test"),

@@ -58,6 +58,18 @@ def test_parts_are_left_out_where_one_does_not_know_them(
     assert len(joined) == 36
 
 
+def test_clouds_that_end_early_say_so_only_if_all_do(scene_dataset: PreparedDataset, tmp_path: Path) -> None:
+    parts = []
+    for name, limit_m in (("varied-160", 2.0), ("no-door-160", 3.0)):
+        parts.append(tmp_path / name)
+        shutil.copytree(scene_dataset.folder.parent / name, parts[-1])
+        description = open_dataset(parts[-1]).description
+        description.model_copy(update={"max_depth_m": limit_m}).save(parts[-1])
+    assert join_datasets(parts, tmp_path / "both").max_depth_m == 3.0
+    parts[0] = scene_dataset.folder.parent / "varied-160"
+    assert join_datasets(parts, tmp_path / "one").max_depth_m == scene_dataset.max_depth_m == 5.0
+
+
 def test_what_cannot_be_joined_is_refused(
     scene_dataset: PreparedDataset, prepared: Path, tmp_path: Path
 ) -> None:

@@ -13,7 +13,7 @@ from doorstate.clouds.io import ReadOptions, read_cloud
 from doorstate.clouds.pcd import write_pcd
 from doorstate.clouds.preparation import prepare_cloud
 from doorstate.dataset import prepare
-from doorstate.dataset.prepare import REJECTED, prepare_dataset
+from doorstate.dataset.prepare import REJECTED, Preparation, prepare_dataset
 from doorstate.dataset.store import CLOUDS, DESCRIPTION, MANIFEST, PARTS, open_dataset
 from doorstate.dataset.strata import distance_band, region
 from doorstate.errors import ConfigError, DatasetError
@@ -34,7 +34,7 @@ def four_samples_a_piece(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture(scope="module")
 def undisturbed(tiny_simulation: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("prepared") / "doors"
-    prepare_dataset(tiny_simulation, folder, NUM_POINTS, workers=1)
+    prepare_dataset(Preparation(tiny_simulation, NUM_POINTS), folder, workers=1)
     return folder
 
 
@@ -59,7 +59,9 @@ def test_a_data_set_without_clouds_makes_the_same_ones_from_its_rows(
 
 
 def test_clouds_and_parts_are_those_of_the_replayed_rows(tiny_simulation: Path, tmp_path: Path) -> None:
-    dataset, rejected = prepare_dataset(tiny_simulation, tmp_path / "doors", NUM_POINTS, workers=1)
+    dataset, rejected = prepare_dataset(
+        Preparation(tiny_simulation, NUM_POINTS), tmp_path / "doors", workers=1
+    )
     assert rejected == []
     assert (len(dataset), dataset.num_points, dataset.clouds.shape) == (15, NUM_POINTS, (15, NUM_POINTS, 3))
     assert (dataset.description.kind, dataset.description.source) == ("simulated", "ogurob")
@@ -81,7 +83,7 @@ def test_clouds_and_parts_are_those_of_the_replayed_rows(tiny_simulation: Path, 
 
 @pytest.mark.usefixtures("four_samples_a_piece")
 def test_processes_make_the_same_files(tiny_simulation: Path, undisturbed: Path, tmp_path: Path) -> None:
-    prepare_dataset(tiny_simulation, tmp_path / "doors", NUM_POINTS, workers=2)
+    prepare_dataset(Preparation(tiny_simulation, NUM_POINTS), tmp_path / "doors", workers=2)
     assert contents(tmp_path / "doors") == contents(undisturbed)
 
 
@@ -96,11 +98,15 @@ def test_goes_on_with_the_pieces_that_are_left(
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        prepare_dataset(tiny_simulation, folder, NUM_POINTS, workers=1, progress=stop_after_three)
+        prepare_dataset(
+            Preparation(tiny_simulation, NUM_POINTS), folder, workers=1, progress=stop_after_three
+        )
     assert sorted(path.name for path in folder.iterdir()) == ["pieces", "preparation.json"]
     (folder / "pieces" / "00001.npz").unlink()
     steps: list[tuple[int, int]] = []
-    prepare_dataset(tiny_simulation, folder, NUM_POINTS, workers=1, progress=lambda *step: steps.append(step))
+    prepare_dataset(
+        Preparation(tiny_simulation, NUM_POINTS), folder, workers=1, progress=lambda *step: steps.append(step)
+    )
     assert steps == [(2, 4), (3, 4), (4, 4)]
     assert contents(folder) == contents(undisturbed)
 
@@ -114,7 +120,7 @@ def test_a_preparation_that_stopped_before_its_end_is_made_whole(
     shutil.copytree(undisturbed, tmp_path / "doors")
     for name in lost:
         (tmp_path / "doors" / name).unlink()
-    prepare_dataset(tiny_simulation, tmp_path / "doors", NUM_POINTS, workers=1)
+    prepare_dataset(Preparation(tiny_simulation, NUM_POINTS), tmp_path / "doors", workers=1)
     assert contents(tmp_path / "doors") == contents(undisturbed)
 
 
@@ -127,10 +133,20 @@ def test_a_whole_data_set_is_opened_and_left_over_pieces_are_cleared(
     (folder / "pieces" / "00000.npz").touch()
     steps: list[tuple[int, int]] = []
     found = prepare_dataset(
-        tiny_simulation, folder, NUM_POINTS, workers=1, progress=lambda *step: steps.append(step)
+        Preparation(tiny_simulation, NUM_POINTS), folder, workers=1, progress=lambda *step: steps.append(step)
     )
     assert (len(found.dataset), steps) == (15, [(1, 1)])
     assert contents(folder) == contents(undisturbed)
+
+
+def test_clouds_end_where_they_are_told_to(tiny_simulation: Path, tmp_path: Path) -> None:
+    asked = Preparation(tiny_simulation, NUM_POINTS, max_depth_m=3.0)
+    near = prepare_dataset(asked, tmp_path / "near", workers=1).dataset
+    far = prepare_dataset(Preparation(tiny_simulation, NUM_POINTS), tmp_path / "far", workers=1).dataset
+    assert (near.max_depth_m, far.max_depth_m) == (3.0, 5.0)
+    assert near.clouds[..., 0].max() <= 3.0 < far.clouds[..., 0].max()
+    with pytest.raises(ConfigError, match="preparation of something else"):
+        prepare_dataset(asked._replace(max_depth_m=2.0), tmp_path / "near", workers=1)
 
 
 @pytest.mark.parametrize(
@@ -156,7 +172,7 @@ def test_a_manifest_that_was_changed_is_noticed(
             row[column] = value
     write_csv(source / MANIFEST, rows)
     with pytest.raises(DatasetError, match=message) as caught:
-        prepare_dataset(source, tmp_path / "doors", NUM_POINTS, workers=1)
+        prepare_dataset(Preparation(source, NUM_POINTS), tmp_path / "doors", workers=1)
     assert rows[0 if value is None else 4]["sample_id"] in str(caught.value)
     assert "\n" not in str(caught.value)
 
@@ -165,7 +181,7 @@ def test_an_unfinished_simulation_is_not_prepared(tiny_simulation: Path, tmp_pat
     shutil.copytree(tiny_simulation, tmp_path / "unfinished")
     (tmp_path / "unfinished" / MANIFEST).unlink()
     with pytest.raises(DatasetError, match="the simulation is not complete; run 'doorstate simulate' again"):
-        prepare_dataset(tmp_path / "unfinished", tmp_path / "doors", NUM_POINTS, workers=1)
+        prepare_dataset(Preparation(tmp_path / "unfinished", NUM_POINTS), tmp_path / "doors", workers=1)
 
 
 def test_another_preparation_or_other_files_are_not_written_over(
@@ -173,11 +189,11 @@ def test_another_preparation_or_other_files_are_not_written_over(
 ) -> None:
     before = contents(undisturbed)
     with pytest.raises(ConfigError, match="holds a preparation of something else"):
-        prepare_dataset(tiny_simulation, undisturbed, NUM_POINTS // 2, workers=1)
+        prepare_dataset(Preparation(tiny_simulation, NUM_POINTS // 2), undisturbed, workers=1)
     (tmp_path / "mine.txt").touch()
     for folder in (tmp_path, tmp_path / "mine.txt"):
         with pytest.raises(ConfigError, match="holds something else"):
-            prepare_dataset(tiny_simulation, folder, NUM_POINTS, workers=1)
+            prepare_dataset(Preparation(tiny_simulation, NUM_POINTS), folder, workers=1)
     assert contents(undisturbed) == before
 
 
@@ -201,7 +217,7 @@ def test_files_of_class_folders_are_prepared_and_the_rest_listed_with_its_reason
     class_folders: Path, tmp_path: Path
 ) -> None:
     folder = tmp_path / "doors"
-    dataset, rejected = prepare_dataset(class_folders, folder, NUM_POINTS, workers=1)
+    dataset, rejected = prepare_dataset(Preparation(class_folders, NUM_POINTS), folder, workers=1)
     assert {row["sample_id"]: row["state"] for row in dataset.rows} == {
         "Closed/a": "closed",
         "Closed/b": "closed",
@@ -229,7 +245,7 @@ def test_files_of_class_folders_are_prepared_and_the_rest_listed_with_its_reason
     assert reasons["Open/notes.txt"].startswith("notes.txt: expected rows of numbers")
     assert reasons["Open/broken.pcd"].startswith("broken.pcd: ")
     assert read_csv(folder / REJECTED) == rejected
-    again = prepare_dataset(class_folders, folder, NUM_POINTS, workers=1)
+    again = prepare_dataset(Preparation(class_folders, NUM_POINTS), folder, workers=1)
     assert again.rejected == rejected
 
 
@@ -237,7 +253,9 @@ def test_poses_bring_strata_and_read_options_are_obeyed(class_folders: Path, tmp
     poses = tmp_path / "poses.csv"
     poses.write_text("file,x_m,y_m,room\nOpen/a.pcd,0.0,2.2,hall\n", encoding="utf-8")
     options = ReadOptions(frame="optical")
-    dataset = prepare_dataset(class_folders, tmp_path / "doors", NUM_POINTS, poses, options, 1).dataset
+    dataset = prepare_dataset(
+        Preparation(class_folders, NUM_POINTS, poses, options), tmp_path / "doors", 1
+    ).dataset
     index = dataset.index_of("Open/a")
     row = dataset.rows[index]
     assert (row["distance_band"], row["region"], row["room"]) == ("2.0-2.5", "green", "hall")
@@ -248,10 +266,10 @@ def test_poses_bring_strata_and_read_options_are_obeyed(class_folders: Path, tmp
 
 
 def test_changed_files_are_another_preparation(class_folders: Path, tmp_path: Path) -> None:
-    prepare_dataset(class_folders, tmp_path / "doors", NUM_POINTS, workers=1)
+    prepare_dataset(Preparation(class_folders, NUM_POINTS), tmp_path / "doors", workers=1)
     (class_folders / "Open" / "b.pcd").unlink()
     with pytest.raises(ConfigError, match="holds a preparation of something else"):
-        prepare_dataset(class_folders, tmp_path / "doors", NUM_POINTS, workers=1)
+        prepare_dataset(Preparation(class_folders, NUM_POINTS), tmp_path / "doors", workers=1)
 
 
 def test_nothing_that_could_be_prepared_is_an_error_with_the_first_reason(
@@ -260,6 +278,6 @@ def test_nothing_that_could_be_prepared_is_an_error_with_the_first_reason(
     with pytest.raises(
         DatasetError, match="none of the 10 clouds could be prepared; the first: too few points: 600"
     ):
-        prepare_dataset(class_folders, tmp_path / "doors", 4096, workers=1)
+        prepare_dataset(Preparation(class_folders, 4096), tmp_path / "doors", workers=1)
     assert not (tmp_path / "doors" / DESCRIPTION).exists()
     assert len(read_csv(tmp_path / "doors" / REJECTED)) == 10

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from doorstate.dataset.loader import CloudLoader
-from doorstate.dataset.prepare import prepare_dataset, prepare_shard
+from doorstate.dataset.prepare import Preparation, prepare_dataset, prepare_shard
 from doorstate.dataset.splits import draw_splits
 from doorstate.errors import ConfigError
 from doorstate.jobs import Shard
@@ -36,7 +36,9 @@ def simulated(tmp_path_factory: pytest.TempPathFactory) -> dict[PresetName, Path
 def test_scenes_are_prepared_with_their_parts_and_columns(
     simulated: dict[PresetName, Path], tmp_path: Path
 ) -> None:
-    dataset = prepare_dataset(simulated["cluttered"], tmp_path / "doors", POINTS, workers=1).dataset
+    dataset = prepare_dataset(
+        Preparation(simulated["cluttered"], POINTS), tmp_path / "doors", workers=1
+    ).dataset
     assert dataset.clouds.shape == (36, POINTS, 3)
     np.testing.assert_array_equal(dataset.labels, list(range(3)) * 12)
     assert {Part.WALL, Part.LEAF, Part.OTHER} <= set(
@@ -55,7 +57,7 @@ def test_scenes_are_prepared_with_their_parts_and_columns(
 def test_scenes_without_a_door_have_a_label_of_their_own_that_no_network_of_three_states_takes(
     simulated: dict[PresetName, Path], tmp_path: Path
 ) -> None:
-    dataset = prepare_dataset(simulated["no-door"], tmp_path / "none", POINTS, workers=1).dataset
+    dataset = prepare_dataset(Preparation(simulated["no-door"], POINTS), tmp_path / "none", workers=1).dataset
     assert dataset.labels.tolist() == [len(STATES)] * 5
     with pytest.raises(ConfigError, match="5 samples show no door, such as no-door-0-00000-no_door"):
         CloudLoader(dataset, [row["sample_id"] for row in dataset.rows], 64)
@@ -65,15 +67,17 @@ def test_preparation_in_shards_joins_to_the_same_bytes(
     simulated: dict[PresetName, Path], tmp_path: Path
 ) -> None:
     source = simulated["cluttered"]
-    prepare_dataset(source, tmp_path / "whole", POINTS, workers=1)
+    prepare_dataset(Preparation(source, POINTS), tmp_path / "whole", workers=1)
     for number in (2, 1):
-        prepare_shard(source, tmp_path / "shared", Shard(number, 2), POINTS, workers=1)
+        prepare_shard(Preparation(source, POINTS), tmp_path / "shared", Shard(number, 2), workers=1)
     steps: list[tuple[int, int]] = []
-    prepare_dataset(source, tmp_path / "shared", POINTS, workers=1, progress=lambda *step: steps.append(step))
+    prepare_dataset(
+        Preparation(source, POINTS), tmp_path / "shared", workers=1, progress=lambda *step: steps.append(step)
+    )
     assert steps == [(2, 2)]
     whole, shared = (
         {path.name: path.read_bytes() for path in (tmp_path / name).iterdir()} for name in ("whole", "shared")
     )
     assert whole == shared
     with pytest.raises(ConfigError, match="something else"):
-        prepare_shard(source, tmp_path / "shared", Shard(1, 2), 128, workers=1)
+        prepare_shard(Preparation(source, 128), tmp_path / "shared", Shard(1, 2), workers=1)

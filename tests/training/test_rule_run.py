@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from sklearn.metrics import f1_score
 
-from doorstate.dataset.prepare import prepare_dataset
+from doorstate.dataset.prepare import Preparation, prepare_dataset
 from doorstate.dataset.splits import Role
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import ConfigError, DatasetError
@@ -24,7 +24,7 @@ from doorstate.types import NO_ANSWER, STATES
 @pytest.fixture(scope="module")
 def doors(simulated_folder: Path, tmp_path_factory: pytest.TempPathFactory) -> PreparedDataset:
     folder = tmp_path_factory.mktemp("doors") / "clouds"
-    return prepare_dataset(simulated_folder, folder, 128, workers=1).dataset
+    return prepare_dataset(Preparation(simulated_folder, 128), folder, workers=1).dataset
 
 
 def config(rule: str) -> RuleRunConfig:

@@ -127,6 +127,10 @@ def prepare(
     workers: Workers = None,
     shard: ShardOption = None,
     layout: LayoutName = None,
+    max_depth: Annotated[
+        float | None,
+        typer.Option("--max-depth-m", help="Leave out points farther ahead, in metres.", min=0.5),
+    ] = None,
 ) -> None:
     """Clean clouds and bring them into farthest-point order, ready for training.
 
@@ -139,21 +143,22 @@ def prepare(
     """
     from doorstate.console import err, progress_bar
     from doorstate.console import out as stdout
-    from doorstate.dataset.prepare import prepare_dataset, prepare_shard
+    from doorstate.dataset.prepare import Preparation, prepare_dataset, prepare_shard
     from doorstate.jobs import Shard
     from doorstate.types import NO_DOOR, STATES
 
     options = read_options(frame, roll, units, depth_scale, intrinsics, (fx, fy, cx, cy), layout)
     if layout is not None and poses is not None:
         raise ConfigError("--poses is for class folders: leave it out with --layout")
+    asked = Preparation(source, points, poses, options, layout, max_depth)
     if shard is not None:
         share = Shard.parse(shard)
         with progress_bar("Preparing") as progress:
-            prepare_shard(source, out, share, points, poses, options, workers, progress, layout)
+            prepare_shard(asked, out, share, workers, progress)
         stdout.print(f"share {shard} is in {out}; when all are, the same command without --shard joins them")
         return
     with progress_bar("Preparing") as progress:
-        summary = prepare_dataset(source, out, points, poses, options, workers, progress, layout)
+        summary = prepare_dataset(asked, out, workers, progress)
     for row in summary.rejected[:10]:
         err.print(f"left out {row['file'] or row['sample_id']}: {row['reason']}")
     if summary.rejected:

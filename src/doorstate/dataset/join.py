@@ -50,12 +50,14 @@ def join_datasets(sources: Sequence[Path], folder: Path) -> PreparedDataset:
         every = [dataset.parts_of(np.arange(len(dataset)), num_points) for dataset in datasets]
         _stack(folder / PARTS, every)
     write_csv(folder / MANIFEST, rows)
+    limits_m = [dataset.description.max_depth_m for dataset in datasets]
     kinds = {dataset.description.kind for dataset in datasets}
     DatasetDescription(
         kind="simulated" if kinds == {"simulated"} else "imported",
         source=" + ".join(dataset.description.source for dataset in datasets),
         num_points=num_points,
         samples=len(rows),
+        max_depth_m=None if None in limits_m else max(limit_m for limit_m in limits_m if limit_m),
         doorstate_version=__version__,
     ).save(folder)
     return open_dataset(folder)

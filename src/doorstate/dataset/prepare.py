@@ -49,20 +49,28 @@ class PreparationSummary(NamedTuple):
     rejected: list[dict[str, str]]  # sample_id, file, reason
 
 
-class _Preparation(NamedTuple):
+class Preparation(NamedTuple):
     """What is prepared, and how."""
 
-    source: Path
-    num_points: int
-    poses_csv: Path | None
-    options: ReadOptions
-    layout: str | None
+    source: Path  # a simulated folder, class folders of clouds, or a `layout`
+    num_points: int = NUM_POINTS  # of every cloud
+    poses_csv: Path | None = None  # distances and angles of class folders (`dataset.class_folders`)
+    options: ReadOptions = ReadOptions()  # what the files do not say of themselves
+    layout: str | None = None  # of another's folders (`dataset.layouts`)
+    max_depth_m: float | None = None  # leave out what lies farther ahead, as of `clouds.preparation`
 
     @property
     def simulated(self) -> bool:
+        """Whether the source is of the simulator."""
         return self.layout is None and is_simulated(self.source)
 
     def rows(self) -> list[dict[str, str]]:
+        """A line for each sample, in their order.
+
+        Raises:
+            ConfigError: the source knows what the options say.
+            DatasetError: there is none.
+        """
         if self.layout is not None:
             return find_layout(self.layout).rows(self.source)
         if not self.simulated:
@@ -81,45 +89,34 @@ class _Preparation(NamedTuple):
             "options": repr(self.options),
             "rows": hashlib.sha256(json.dumps(rows).encode()).hexdigest(),
             **({} if self.layout is None else {"layout": self.layout}),
+            **({} if self.max_depth_m is None else {"max_depth_m": self.max_depth_m}),
         }
         return json.dumps(settings, indent=2) + "\n"
 
 
 class _Piece(NamedTuple):
-    asked: _Preparation
+    asked: Preparation
     rows: list[dict[str, str]]
 
 
 def prepare_dataset(
-    source: Path,
-    folder: Path,
-    num_points: int = NUM_POINTS,
-    poses_csv: Path | None = None,
-    options: ReadOptions | None = None,
-    workers: int | None = None,
-    progress: Progress = no_progress,
-    layout: str | None = None,
+    asked: Preparation, folder: Path, workers: int | None = None, progress: Progress = no_progress
 ) -> PreparationSummary:
-    """Prepare a simulated folder, class folders of clouds, or a `layout` of `dataset.layouts`, into `folder`.
+    """Prepare clouds into `folder`, all of the same size.
 
     A cloud with fewer than `num_points` distinct points, or that cannot be read, is left out and listed in
-    `rejected.csv` with the reason: every cloud of a prepared data set has exactly `num_points` distinct points.
+    `rejected.csv` with the reason.
 
     Args:
-        source: what is prepared.
+        asked: what is prepared, and how.
         folder: where to; what a killed preparation or shards of it have begun is continued.
-        num_points: of every cloud.
-        poses_csv: distances and angles of class folders (`dataset.class_folders`).
-        options: what the files do not say of themselves.
         workers: processes; None is one per processor.
         progress: called with pieces done and pieces in all.
-        layout: name of another's layout of folders.
 
     Raises:
         ConfigError: `folder` holds something prepared from another source or with other settings.
         DatasetError: nothing to prepare, or nothing could be prepared.
     """
-    asked = _Preparation(source, num_points, poses_csv, options or ReadOptions(), layout)
     pieces, paths = _plan(asked, folder)
     if (folder / DESCRIPTION).exists():
         shutil.rmtree(folder / _SCRATCH, ignore_errors=True)
@@ -129,11 +126,12 @@ def prepare_dataset(
     run_pieces(_prepare_piece, pieces, paths, workers or default_workers(), progress)
     rows = [row for piece in pieces for row in piece.rows]
     rejected = _assemble(folder, asked, rows, paths)
-    name = read_settings(source).preset.name if asked.simulated else source.resolve().name
+    name = read_settings(asked.source).preset.name if asked.simulated else asked.source.resolve().name
     DatasetDescription(
         kind="simulated" if asked.simulated else "imported",
         source=name,
-        num_points=num_points,
+        num_points=asked.num_points,
+        max_depth_m=asked.max_depth_m,
         samples=len(rows) - len(rejected),
         doorstate_version=__version__,
     ).save(folder)
@@ -142,23 +140,18 @@ def prepare_dataset(
 
 
 def prepare_shard(
-    source: Path,
+    asked: Preparation,
     folder: Path,
     shard: Shard,
-    num_points: int = NUM_POINTS,
-    poses_csv: Path | None = None,
-    options: ReadOptions | None = None,
     workers: int | None = None,
     progress: Progress = no_progress,
-    layout: str | None = None,
 ) -> None:
-    """Prepare the pieces of one shard; `prepare_dataset` with the same arguments joins them when all are done.
+    """Prepare the pieces of one shard; `prepare_dataset` of the same joins them when all are done.
 
     Raises:
         ConfigError: `folder` holds something prepared from another source or with other settings.
         DatasetError: nothing to prepare.
     """
-    asked = _Preparation(source, num_points, poses_csv, options or ReadOptions(), layout)
     pieces, paths = _plan(asked, folder)
     if (folder / DESCRIPTION).exists():
         progress(1, 1)
@@ -166,7 +159,7 @@ def prepare_shard(
     run_pieces(_prepare_piece, shard.of(pieces), shard.of(paths), workers or default_workers(), progress)
 
 
-def _plan(asked: _Preparation, folder: Path) -> tuple[list[_Piece], list[Path]]:
+def _plan(asked: Preparation, folder: Path) -> tuple[list[_Piece], list[Path]]:
     """Claim the folder, and say what is to be done and where it goes."""
     rows = asked.rows()
     _claim(folder, asked.to_json(rows))
@@ -213,10 +206,11 @@ def _prepare_piece(piece: _Piece, path: Path) -> None:
     for row in piece.rows:
         try:
             if simulated:
-                cloud, part = _from_simulation(row, asked.num_points)
+                cloud, part = _from_simulation(row, asked)
                 parts.append(part)
             else:
-                cloud = exactly(read(asked.source / row["file"], asked.options), asked.num_points)[0]
+                raw = read(asked.source / row["file"], asked.options)
+                cloud = exactly(raw, asked.num_points, asked.max_depth_m)[0]
             clouds.append(cloud)
             reasons.append("")
         except (CloudError, CameraError) as error:
@@ -230,18 +224,18 @@ def _prepare_piece(piece: _Piece, path: Path) -> None:
         )
 
 
-def _from_simulation(row: dict[str, str], num_points: int) -> tuple[Points, np.ndarray]:
+def _from_simulation(row: dict[str, str], asked: Preparation) -> tuple[Points, np.ndarray]:
     sample = unflatten(row)
     frame = replay(sample)
     if depth_sha256(frame) != sample.depth_sha256:
         raise DatasetError(
             f"{sample.sample_id}: renders differently than its manifest says; simulate it again here"
         )
-    return sample_frame(frame, num_points)
+    return sample_frame(frame, asked.num_points, asked.max_depth_m)
 
 
 def _assemble(
-    folder: Path, asked: _Preparation, rows: list[dict[str, str]], paths: list[Path]
+    folder: Path, asked: Preparation, rows: list[dict[str, str]], paths: list[Path]
 ) -> list[dict[str, str]]:
     reasons: list[str] = []
     for path in paths:

@@ -12,13 +12,15 @@ from doorstate.simulation.frames import Frame
 from doorstate.types import Points
 
 
-def exactly(points: Points, num_points: int) -> tuple[Points, NDArray[np.int64]]:
-    """`num_points` distinct points in farthest-point order, and their rows.
+def exactly(
+    points: Points, num_points: int, max_depth_m: float | None = None
+) -> tuple[Points, NDArray[np.int64]]:
+    """`num_points` distinct points in farthest-point order, none deeper than that, and their rows.
 
     Raises:
         CloudContentError: there are fewer.
     """
-    prepared = prepare_cloud(points, num_points)
+    prepared = prepare_cloud(points, num_points, max_depth_m=max_depth_m)
     if len(prepared.points) < num_points:
         raise CloudContentError(
             f"too few points: {len(prepared.points)} distinct, {num_points} asked for (--points)"
@@ -26,11 +28,13 @@ def exactly(points: Points, num_points: int) -> tuple[Points, NDArray[np.int64]]
     return prepared
 
 
-def sample_frame(frame: Frame, num_points: int) -> tuple[Points, NDArray[np.uint8]]:
+def sample_frame(
+    frame: Frame, num_points: int, max_depth_m: float | None = None
+) -> tuple[Points, NDArray[np.uint8]]:
     """(n, 3) metres in farthest-point order, and the part of each (doorstate.types.Part).
 
     Raises:
         CloudContentError: the frame shows fewer distinct points.
     """
-    cloud, indices = exactly(frame.points, num_points)
+    cloud, indices = exactly(frame.points, num_points, max_depth_m)
     return cloud, frame.cut.part.reshape(-1)[indices]

@@ -36,6 +36,7 @@ class DatasetDescription(Frozen):
     samples: int
     doorstate_version: str
     clouds: Literal["stored", "replayed"] = "stored"  # replayed: from the rows of a simulated data set
+    max_depth_m: float | None = None  # what lay farther ahead was left out
 
     def save(self, folder: Path) -> None:
         """Write it; the folder counts as complete from here on."""
@@ -73,9 +74,11 @@ class PreparedDataset:
 
     @property
     def max_depth_m(self) -> float | None:
-        """How far the simulated camera saw, the farthest if there are several; None where nobody knows."""
+        """How far ahead clouds reach, the farthest if cameras differ; None where nobody knows."""
         known = {row.get("camera.max_depth_m", "") for row in self.rows}
-        return None if "" in known else max(map(float, known), default=None)
+        seen_m = None if "" in known else max(map(float, known), default=None)
+        reaches_m = (seen_m, self.description.max_depth_m)
+        return min((reach_m for reach_m in reaches_m if reach_m is not None), default=None)
 
     @property
     def clouds(self) -> NDArray[np.float32]:
@@ -139,7 +142,9 @@ class PreparedDataset:
     def _make(self, index: int, num_points: int | None) -> tuple[Points, NDArray[np.uint8]]:
         count = num_points or self.num_points
         if index not in self._made or len(self._made[index][0]) < count:
-            self._made[index] = sample_frame(replay(unflatten(self.rows[index])), count)
+            self._made[index] = sample_frame(
+                replay(unflatten(self.rows[index])), count, self.description.max_depth_m
+            )
         points, parts = self._made[index]
         return points[:count], parts[:count]
 
