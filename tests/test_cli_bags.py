@@ -181,7 +181,7 @@ def test_an_optical_frame_that_is_read_as_body_is_said_once(
         (("cloud.npy", "--every", 2), "are for --bag", 1),
         (("cloud.npy", "--out", "a.csv"), "are for --bag", 1),
         (("--bag", "BAG", "--out", "a.jsonl", "--json"), "leave --json out", 1),
-        (("--bag", "BAG", "--out", "a.txt"), "name a .csv or .jsonl file", 1),
+        (("--bag", "gone.bag", "--out", "a.txt"), "name a .csv or .jsonl file", 1),
         (("--bag", "gone.bag"), "gone.bag: no such file", 1),
         (("--bag", "BAG", "--topic", "/gone"), "usable are: /points (PointCloud2, 4)", 1),
     ],

@@ -71,7 +71,7 @@ def predict(
       doorstate predict depth.png --intrinsics camera_info.yaml --roll 90
       doorstate predict --bag run.bag --topic /camera/depth/points --frame optical --out run.csv
     """
-    from doorstate.cli.bags import predict_bag
+    from doorstate.cli.bags import WRITERS, predict_bag
     from doorstate.clouds.io import find_clouds
     from doorstate.deployment.loading import load_predictor
 
@@ -80,6 +80,8 @@ def predict(
         raise ConfigError("--topic, --camera-info-topic, --every and --out are for --bag")
     if out is not None and as_json:
         raise ConfigError("--out writes JSON lines to a file that ends in .jsonl: leave --json out")
+    if out is not None and out.suffix not in WRITERS:
+        raise ConfigError(f"--out {out}: name a {' or '.join(WRITERS)} file")
     options = read_options(frame, roll, units, depth_scale, intrinsics, (fx, fy, cx, cy))
     found = find_clouds(files or [])
     predictor = load_predictor(network, weights, rule, points)

@@ -14,7 +14,7 @@ import typer
 
 from doorstate.cli.predictions import table_cells
 from doorstate.deployment.answers import described
-from doorstate.errors import CloudReadError, ConfigError, DoorstateError
+from doorstate.errors import CloudReadError, DoorstateError
 
 if TYPE_CHECKING:
     from doorstate.clouds.bags import BagTopic, StampedCloud
@@ -89,11 +89,8 @@ def _destination(out: Path | None, as_json: bool) -> Iterator[Write]:
         with _printed_lines() if as_json else _printed_table() as write:
             yield write
         return
-    writers = {".csv": _csv_rows, ".jsonl": _json_lines}
-    if out.suffix not in writers:
-        raise ConfigError(f"--out {out}: name a .csv or .jsonl file")
     with atomic_path(out) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
-        yield writers[out.suffix](stream)
+        yield WRITERS[out.suffix](stream)
 
 
 @contextmanager
@@ -137,3 +134,7 @@ def _csv_rows(stream: Any) -> Write:
         rows.writerow({column: flat.get(column) for column in columns})
 
     return write
+
+
+WRITERS: dict[str, Callable[[Any], Write]] = {".csv": _csv_rows, ".jsonl": _json_lines}
+"""By the ending of the file."""
