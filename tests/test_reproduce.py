@@ -5,12 +5,14 @@ from __future__ import annotations
 
 import importlib.util
 import sys
+import tomllib
 from pathlib import Path
 from types import ModuleType
 
 import pytest
 
 from doorstate.dataset.store import PreparedDataset
+from doorstate.simulation.settings import settings_for
 from doorstate.training.comparison import compare, load_experiment
 from doorstate.training.run_folder import RunFolder
 
@@ -73,6 +75,50 @@ def test_folds_that_all_methods_have_finished_are_shown(reproduce: ModuleType, t
         shown.append(whole_folds(tmp_path))
     assert shown == [0, 0, 1, 1, 2, 3]
     assert unfinished_runs(tmp_path) == []
+
+
+# The demo makes clouds of its own: `make demo`.
+@pytest.mark.parametrize(
+    "path", sorted(REPOSITORY.glob("experiments/[!d]*.toml")), ids=lambda path: path.stem
+)
+def test_an_experiment_comes_after_its_data_and_what_it_begins_with(
+    path: Path, reproduce: ModuleType, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    called: list[str] = []
+    monkeypatch.setattr(reproduce, "_doorstate", called.append)
+    monkeypatch.setattr(reproduce, "commands", lambda folder: [f"make {folder.name}"])
+    reproduce.run(path.stem)
+    made = [line.removeprefix("make ") for line in called if line.startswith("make ")]
+    asked = tomllib.loads(path.read_text())
+    assert {Path(each).name for each in asked.get("tested", {}).values() or [asked["dataset"]]} <= set(made)
+    (own,) = (number for number, line in enumerate(called) if f"/{path.name}" in line)
+    for before in asked.get("trained", {}).values() or filter(None, [asked.get("start_from")]):
+        (number,) = (
+            n for n, line in enumerate(called) if f"compare experiments/{Path(before).name}.toml" in line
+        )
+        assert number < own
+
+
+def test_data_sets_are_made_of_what_the_command_line_knows(reproduce: ModuleType, tmp_path: Path) -> None:
+    import data_sets
+
+    seeds: dict[str, set[str]] = {}
+    for name in data_sets.SIMULATED:
+        simulate, prepare = data_sets.commands(tmp_path / f"{name}-4096")
+        words = simulate.split()
+        seed = words[words.index("--seed") + 1] if "--seed" in words else "0"
+        preset = words[words.index("--preset") + 1]
+        scenes = words[words.index("--scenes") + 1] if "--scenes" in words else None
+        sensor = words[words.index("--sensor") + 1] if "--sensor" in words else "none"
+        settings_for(preset, int(seed), None, None if scenes is None else int(scenes), (), sensor)
+        assert prepare.startswith(f"prepare {words[-1]} ")
+        seeds.setdefault(seed, set()).add("test" if name.startswith("test-") else "train")
+    assert all(len(uses) == 1 for uses in seeds.values()), "no scene is trained and tested on"
+    *parts, join = data_sets.commands(tmp_path / "mixture-4096")
+    assert [line.split()[-1] for line in parts[1::2]] == join.split()[1:-2]
+    (tmp_path / "mixture-4096").mkdir()
+    (tmp_path / "mixture-4096" / "dataset.json").touch()
+    assert list(data_sets.commands(tmp_path / "mixture-4096")) == []
 
 
 @pytest.mark.parametrize("arguments", [[], ["run"], ["check", "now"], ["publish"], ["sell", "paper"]])

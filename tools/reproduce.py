@@ -16,15 +16,19 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import tomllib
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
+
+from data_sets import commands
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 RESULTS, RUNS, EXPERIMENTS = REPOSITORY / "results", REPOSITORY / "runs", REPOSITORY / "experiments"
 ROWS = RESULTS / "ogurob-4096"  # the data set without its clouds, which are replayed from the rows
 DOORSTATE = Path(sys.executable).with_name("doorstate")
 PAGES = (Path("docs") / "results.md", Path("docs") / "related.md")
+STUDIES = {"transfer": "tested", "resolution": "points"}  # commands, and what only their files say
 BESIDE = {"related": "paper"}  # is shown beside the methods of another comparison
 
 # What `publish` leaves behind: large, or of use only to a running training.
@@ -50,15 +54,16 @@ def main(arguments: list[str]) -> None:
 
 
 def run(name: str) -> None:
-    """Simulate, prepare and run one experiment; every step prints the command it is."""
-    _doorstate("simulate --preset ogurob --out data/ogurob")
-    _doorstate("prepare data/ogurob --out data/ogurob-4096")
-    if name == "resolution":
-        _doorstate("compare experiments/paper.toml --jobs 2")  # it begins with those weights
-        _doorstate(f"resolution experiments/{name}.toml --jobs 2")
-        return
-    _doorstate(f"compare experiments/{name}.toml --jobs 2")
-    if name != "weights":
+    """Simulate, prepare and run one experiment, and before it those it begins with; every step prints its command."""
+    asked = tomllib.loads((EXPERIMENTS / f"{name}.toml").read_text(encoding="utf-8"))
+    for before in asked.get("trained", {}).values() or filter(None, [asked.get("start_from")]):
+        run(Path(before).name)
+    for dataset in asked.get("tested", {}).values() or [asked["dataset"]]:
+        for command in commands(REPOSITORY / dataset):
+            _doorstate(command)
+    study = next((study for study, key in STUDIES.items() if key in asked), None)
+    _doorstate(f"{study or 'compare'} experiments/{name}.toml --jobs 2")
+    if study is None and asked.get("protocol") != "all":
         _doorstate(f"report runs/{name}")
 
 

@@ -21,6 +21,7 @@ from doorstate.errors import ConfigError, RunError
 from doorstate.files import read_csv
 from doorstate.training.comparison import Experiment, compare, load_experiment, prepare_comparison, runs_of
 from doorstate.training.resolution import load_study
+from doorstate.training.transfer import load_transfer
 from doorstate.training.weights import read_card
 
 CHANGES = {"epochs": 4, "batch_size": 8, "precision": "fp32"}
@@ -99,8 +100,12 @@ def test_a_missing_experiment_is_named(tmp_path: Path) -> None:
     "path", sorted(Path(__file__).parents[2].glob("experiments/*.toml")), ids=lambda p: p.name
 )
 def test_the_experiments_of_the_repository_are_valid(path: Path) -> None:
-    load = load_study if path.stem == "resolution" else lambda path: load_experiment(path, {})
-    assert load(path).name == path.stem
+    studies = {"resolution": load_study, "transfer": load_transfer, "augmentation": load_transfer}
+    load = studies.get(path.stem, lambda path: load_experiment(path, {}))
+    read = load(path)
+    assert read.name == path.stem
+    if isinstance(read, Experiment):
+        read.check()
 
 
 def test_runs_go_on_from_the_weights_of_another_comparison(

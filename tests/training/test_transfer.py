@@ -91,6 +91,19 @@ def test_weights_are_tested_as_they_are(
     assert read_json(again / "metrics.json")["train_samples"] == 0
 
 
+def test_a_comparison_is_asked_for_the_networks_that_it_has(
+    small_dataset: PreparedDataset, tmp_path: Path
+) -> None:
+    data = str(small_dataset.folder)
+    one = trained(tmp_path / "one", small_dataset)
+    both = trained(tmp_path / "both", small_dataset, networks=("dgcnn", "pointnet"))
+    names = {"one": str(one), "both": str(both)}
+    found = study(trained=names, tested={"x": data}, networks=("pointnet", "dgcnn"))
+    assert [cell.experiment.networks for cell in found.cells()] == [("pointnet",), ("pointnet", "dgcnn")]
+    with pytest.raises(ConfigError, match="one: has no dgcnn"):
+        list(study(trained=names, tested={"x": data}, networks=("dgcnn",)).cells())
+
+
 def test_what_leaves_nothing_to_test_is_refused(small_dataset: PreparedDataset, tmp_path: Path) -> None:
     data = str(small_dataset.folder)
     everything = trained(tmp_path / "all", small_dataset, protocol="all", folds=1)

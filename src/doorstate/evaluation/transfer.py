@@ -31,6 +31,14 @@ class TransferResults:
     macro_f1: dict[tuple[str, str, str], float]
     samples: dict[str, int]
 
+    def trainings(self, network: str) -> tuple[str, ...]:
+        """Those that the network was part of."""
+        return tuple(
+            row
+            for row in self.trained
+            if any((network, row, column) in self.macro_f1 for column in self.tested)
+        )
+
 
 def load_transfer_results(folder: Path, trained: Sequence[str], tested: Sequence[str]) -> TransferResults:
     """Read the comparisons of a study; what is not there yet is left out.
@@ -71,7 +79,7 @@ def transfer_table(results: TransferResults) -> Table:
             *(number(results.macro_f1.get((network, row, column), _NAN)) for column in results.tested),
         )
         for network in results.networks
-        for row in results.trained
+        for row in results.trainings(network)
     )
     counts = ", ".join(
         f"{name} {results.samples[name]}" for name in results.tested if name in results.samples
@@ -88,16 +96,16 @@ def transfer_table(results: TransferResults) -> Table:
 
 def transfer_figure(results: TransferResults) -> Figure:
     """One grid of numbers for each network, the darker the better."""
-    height = 0.36 * len(results.trained) + 0.5
+    lines = [len(results.trainings(network)) for network in results.networks]
     width = 0.75 * len(results.tested) + 1.6
-    count = len(results.networks)
-    figure = Figure(figsize=(width, height * count + 0.9), layout="constrained")
-    axes = figure.subplots(count, 1, squeeze=False, sharex=True)[:, 0]
+    height = 0.36 * sum(lines) + 0.5 * len(lines) + 0.9
+    figure = Figure(figsize=(width, height), layout="constrained")
+    axes = figure.subplots(len(lines), 1, squeeze=False, sharex=True, height_ratios=lines)[:, 0]
     for axis, network in zip(axes, results.networks, strict=True):
         grid = np.array(
             [
                 [results.macro_f1.get((network, row, column), _NAN) for column in results.tested]
-                for row in results.trained
+                for row in results.trainings(network)
             ]
         )
         axis.imshow(grid, cmap="Blues", vmin=0.3, vmax=1.0, aspect="auto")
@@ -111,7 +119,7 @@ def transfer_figure(results: TransferResults) -> Figure:
                 fontsize=8,
                 color="white" if value > 0.75 else "black",
             )
-        axis.set_yticks(range(len(results.trained)), results.trained)
+        axis.set_yticks(range(len(grid)), results.trainings(network))
         axis.set_ylabel(network)
         axis.spines[:].set_visible(False)
         axis.tick_params(length=0)

@@ -44,24 +44,28 @@ class TransferStudy(Frozen):
     num_points: int = Field(default=NUM_POINTS, ge=128)
 
     def cells(self) -> Iterator[Cell]:
-        """Every pair of a comparison and a data set.
+        """Every pair of a comparison, with those of the networks that it has, and a data set.
 
         Raises:
+            ConfigError: a comparison has none of them.
             RunError: a comparison is not there.
         """
         for trained, comparison in self.trained.items():
-            heads = _comparison(comparison).get("heads", ())
+            asked = _comparison(comparison)
+            networks = tuple(network for network in self.networks if network in asked["networks"])
+            if not networks:
+                raise ConfigError(f"{comparison}: has no {' or '.join(self.networks)}")
             for tested, dataset in self.tested.items():
                 experiment = Experiment(
                     name=f"{self.name}: {trained} on {tested}",
                     dataset=dataset,
                     protocol=UNSEEN,
-                    networks=self.networks,
+                    networks=networks,
                     folds=1,
                     num_points=self.num_points,
                     recipe_changes={"epochs": 0},
                     start_from=comparison,
-                    heads=heads,
+                    heads=asked.get("heads", ()),
                 )
                 experiment.check()
                 yield Cell(trained, tested, experiment)
