@@ -131,6 +131,12 @@ def test_weights_load_by_path_and_by_name(tmp_path: Path) -> None:
         Predictor.load("nonet")
 
 
+@pytest.mark.parametrize("points", [0, -5, 127])
+def test_fewer_points_than_a_network_needs_are_an_error(points: int) -> None:
+    with pytest.raises(ConfigError, match=f"^{points} points asked for: a network looks at 128 or more$"):
+        Predictor.load(points=points)
+
+
 def clock_of(milliseconds: list[float]) -> Callable[[], float]:
     """A clock on which the n-th call of a predictor takes the n-th time."""
     stamps = iter([stamp for each in milliseconds for stamp in (0.0, each / 1000)])

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from doorstate.clouds.preparation import NUM_POINTS, PreparedCloud, prepare_cloud
+from doorstate.clouds.preparation import MIN_POINTS, NUM_POINTS, PreparedCloud, prepare_cloud
 from doorstate.deployment.gate import Gate
 from doorstate.deployment.onnx_network import OnnxNetwork
 from doorstate.errors import ConfigError, MissingExtraError, TooFewPointsError, WeightsError
@@ -81,7 +81,7 @@ class Predictor:
         clock: seconds that pass, for `milliseconds` and time budgets.
 
     Raises:
-        ConfigError: another number of points than an exported network takes.
+        ConfigError: fewer than 128 points, or another number than an exported network takes.
     """
 
     def __init__(
@@ -94,6 +94,8 @@ class Predictor:
         gate: Gate | None = DEFAULT_GATE,
         clock: Callable[[], float] = time.perf_counter,
     ) -> None:
+        if points < MIN_POINTS:
+            raise ConfigError(f"{points} points asked for: a network looks at {MIN_POINTS} or more")
         if isinstance(network, OnnxNetwork):
             if points != network.card.num_points:
                 raise ConfigError(
@@ -139,8 +141,8 @@ class Predictor:
 
         Raises:
             WeightsError: no such weights, or they cannot be used.
-            ConfigError: both points and a budget, a budget that is no time, or points that an `.onnx` file does not
-                take.
+            ConfigError: both points and a budget, a budget that is no time, fewer than 128 points, or points that an
+                `.onnx` file does not take.
             MissingExtraError: what the file needs, torch or onnxruntime, is not installed.
         """
         if budget_ms is not None and (points is not None or not budget_ms > 0):
@@ -153,7 +155,7 @@ class Predictor:
             return cls(network, card, count, thin=thin, gate=gate, clock=clock)
 
         if budget_ms is None:
-            return looking_at(points or card.num_points)
+            return looking_at(card.num_points if points is None else points)
         exported = isinstance(network, OnnxNetwork)
         counts = [] if exported else [count for count in BUDGET_POINTS if count <= card.num_points]
         counts = counts or [card.num_points]
