@@ -85,7 +85,7 @@ def test_an_experiment_comes_after_its_data_and_what_it_begins_with(
     path: Path, reproduce: ModuleType, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     called: list[str] = []
-    monkeypatch.setattr(reproduce, "_doorstate", called.append)
+    monkeypatch.setattr(reproduce, "doorstate", called.append)
     monkeypatch.setattr(reproduce, "commands", lambda folder: [f"make {folder.name}"])
     reproduce.run(path.stem)
     made = [line.removeprefix("make ") for line in called if line.startswith("make ")]

@@ -6,36 +6,26 @@ Every step is a command that anybody can type; each is printed before it runs. S
 
 from __future__ import annotations
 
-import shlex
-import subprocess
 import sys
 import time
-from pathlib import Path
 
-REPOSITORY = Path(__file__).resolve().parents[1]
-DOORSTATE = Path(sys.executable).with_name("doorstate")
-
-
-def run(arguments: str) -> None:
-    """Print and run one `doorstate` command; its error ends the demo."""
-    print(f"\n$ doorstate {arguments}", flush=True)
-    finished = subprocess.run([DOORSTATE, *shlex.split(arguments)], cwd=REPOSITORY, check=False)
-    if finished.returncode:
-        sys.exit(finished.returncode)
+from doorstate_command import REPOSITORY, doorstate
 
 
 def main(folder: str) -> None:
     """Run the demo into `folder`, a path below the repository."""
     started = time.monotonic()
-    run(f"simulate --preset ogurob --poses 80 --out {folder}/simulated")
-    run(f"prepare {folder}/simulated --points 512 --out {folder}/clouds")
-    run(f"compare experiments/demo.toml --data {folder}/clouds --jobs 2 --out {folder}/comparison")
-    run(f"report {folder}/comparison --out {folder}/report")
+    doorstate(f"simulate --preset ogurob --poses 80 --out {folder}/simulated")
+    doorstate(f"prepare {folder}/simulated --points 512 --out {folder}/clouds")
+    doorstate(f"compare experiments/demo.toml --data {folder}/clouds --jobs 2 --out {folder}/comparison")
+    doorstate(f"report {folder}/comparison --out {folder}/report")
     # New doors as files, from another seed: what a robot would hand over.
-    run(f"simulate --preset ogurob --poses 5 --seed 7 --keep pcd --out {folder}/new")
-    run(f"predict {folder}/new/pcd --weights {folder}/comparison/runs/pointnet2/fold0/weights.safetensors")
+    doorstate(f"simulate --preset ogurob --poses 5 --seed 7 --keep pcd --out {folder}/new")
+    doorstate(
+        f"predict {folder}/new/pcd --weights {folder}/comparison/runs/pointnet2/fold0/weights.safetensors"
+    )
     # The same files with the weights of the package, which have seen the complete data set.
-    run(f"predict {folder}/new/pcd")
+    doorstate(f"predict {folder}/new/pcd")
     page = (REPOSITORY / folder / "report" / "report.html").resolve()
     print(f"\nThe report: {page}\nDone in {(time.monotonic() - started) / 60:.1f} minutes.")
 

@@ -11,9 +11,7 @@ python tools/reproduce.py check                # the same into a scratch folder:
 from __future__ import annotations
 
 import multiprocessing
-import shlex
 import shutil
-import subprocess
 import sys
 import tempfile
 import tomllib
@@ -22,11 +20,10 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 from data_sets import commands
+from doorstate_command import REPOSITORY, doorstate
 
-REPOSITORY = Path(__file__).resolve().parents[1]
 RESULTS, RUNS, EXPERIMENTS = REPOSITORY / "results", REPOSITORY / "runs", REPOSITORY / "experiments"
 ROWS = RESULTS / "ogurob-4096"  # the data set without its clouds, which are replayed from the rows
-DOORSTATE = Path(sys.executable).with_name("doorstate")
 PAGES = (Path("docs") / "results.md", Path("docs") / "related.md")
 STUDIES = {"transfer": "tested", "resolution": "points"}  # commands, and what only their files say
 BESIDE = {"related": "paper"}  # is shown beside the methods of another comparison
@@ -60,11 +57,11 @@ def run(name: str) -> None:
         run(Path(before).name)
     for dataset in asked.get("tested", {}).values() or [asked["dataset"]]:
         for command in commands(REPOSITORY / dataset):
-            _doorstate(command)
+            doorstate(command)
     study = next((study for study, key in STUDIES.items() if key in asked), None)
-    _doorstate(f"{study or 'compare'} experiments/{name}.toml --jobs 2")
+    doorstate(f"{study or 'compare'} experiments/{name}.toml --jobs 2")
     if study is None and asked.get("protocol") != "all":
-        _doorstate(f"report runs/{name}")
+        doorstate(f"report runs/{name}")
 
 
 def publish(source: Path, target: Path) -> None:
@@ -173,13 +170,6 @@ def _comparisons() -> Iterator[tuple[list[Path], int]]:
         folders = [*([RESULTS / beside] if beside else []), path.parent]
         if folds := min(whole_folds(folder) for folder in folders):
             yield folders, folds
-
-
-def _doorstate(arguments: str) -> None:
-    print(f"\n$ doorstate {arguments}", flush=True)
-    finished = subprocess.run([DOORSTATE, *shlex.split(arguments)], cwd=REPOSITORY, check=False)
-    if finished.returncode:
-        sys.exit(finished.returncode)
 
 
 if __name__ == "__main__":
