@@ -88,12 +88,14 @@ def accuracy(confusion: NDArray[Any]) -> float:
     return float(ratio(np.trace(confusion), confusion.sum()))
 
 
-def wilson_interval(successes: int, trials: int) -> Interval:
+def wilson_interval(successes: float, trials: float) -> Interval:
     """Give the 95 % Wilson score interval of a proportion; NaN where there were no trials (Wilson 1927)."""
     if trials == 0:
         return float("nan"), float("nan")
-    interval = binomtest(int(successes), int(trials)).proportion_ci(CONFIDENCE, method="wilson")
-    return float(interval.low), float(interval.high)
+    share, z = successes / trials, float(norm.ppf((1 + CONFIDENCE) / 2))
+    middle, scale = share + z * z / (2 * trials), 1 + z * z / trials
+    half = z * math.sqrt(share * (1 - share) / trials + (z / (2 * trials)) ** 2)
+    return max(0.0, (middle - half) / scale), min(1.0, (middle + half) / scale)
 
 
 def grouped_interval(right: NDArray[np.bool_], groups: Sequence[str]) -> Interval:
@@ -107,13 +109,10 @@ def grouped_interval(right: NDArray[np.bool_], groups: Sequence[str]) -> Interva
         groups: N names.
     """
     if len(right) == 0:
-        return float("nan"), float("nan")
+        return wilson_interval(0, 0)
     _, sizes = np.unique(np.asarray(groups), return_counts=True)
-    trials, share = sizes.sum() ** 2 / (sizes**2).sum(), float(right.mean())
-    z = float(norm.ppf((1 + CONFIDENCE) / 2))
-    middle, scale = share + z * z / (2 * trials), 1 + z * z / trials
-    half = z * math.sqrt(share * (1 - share) / trials + (z / (2 * trials)) ** 2)
-    return max(0.0, (middle - half) / scale), min(1.0, (middle + half) / scale)
+    trials = float(sizes.sum() ** 2 / (sizes**2).sum())
+    return wilson_interval(float(right.mean()) * trials, trials)
 
 
 @dataclass(frozen=True)
