@@ -1,34 +1,27 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Door clouds to measure with: the same ones every time, drawn from one seed or from a prepared data set."""
+"""Door clouds to measure with: the same ones every time, simulated or from a prepared data set."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from doorstate.clouds.preparation import normalize, prepare_cloud
+from doorstate.clouds.preparation import normalize
 from doorstate.dataset.splits import draw_splits
 from doorstate.dataset.store import PreparedDataset, open_dataset
+from doorstate.deployment.comparison_clouds import LabelledClouds, comparison_clouds, comparison_doors
 from doorstate.errors import ConfigError
 from doorstate.jobs import Progress
 from doorstate.simulation.frames import Frame, replay
-from doorstate.simulation.generate import PRESETS, SampleRow, draw_pose, pose_indices
+from doorstate.simulation.generate import PRESETS, draw_pose, pose_indices
 from doorstate.simulation.manifest import unflatten
-from doorstate.types import STATES, Points
-
-_SEED = 0
-_PRESET = PRESETS["ogurob"]
+from doorstate.types import Points
 
 
-class Clouds(NamedTuple):
-    """Prepared clouds in farthest-point order, (M, n, 3) metres, and their (M,) labels."""
-
-    points: Points
-    labels: NDArray[np.int64]
+class Clouds(LabelledClouds):
+    """Prepared clouds and their labels."""
 
     def cut(self, num_points: int) -> Clouds:
         """The first points of every cloud, normalised as a network wants them."""
@@ -37,32 +30,21 @@ class Clouds(NamedTuple):
 
 def raw_cloud() -> Points:
     """(480, 640, 3) organized cloud in metres as the simulated depth camera gives it, NaN where nothing is."""
-    return replay(draw_pose(_PRESET, _SEED, pose_indices(3)[1])[1]).points
+    return replay(draw_pose(PRESETS["ogurob"], 0, pose_indices(3)[1])[1]).points
 
 
 def raw_clouds(count: int) -> list[Points]:
     """As `raw_cloud`, of doors in all three states, poses spread over the room."""
-    return [replay(row).points for row in _doors(count)]
-
-
-def _doors(count: int) -> list[SampleRow]:
-    poses = pose_indices(max(3, -(-count // len(STATES))))
-    return [row for pose in poses for row in draw_pose(_PRESET, _SEED, pose)][:count]
+    return [replay(row).points for row in comparison_doors(count)]
 
 
 def simulated_clouds(count: int, num_points: int) -> Clouds:
-    """Render and prepare doors in all three states, poses spread over the room.
+    """As `raw_clouds`, prepared.
 
     Raises:
         ConfigError: more points are asked for than a cloud has.
     """
-    rows = _doors(count)
-    clouds = [prepare_cloud(replay(row).points, num_points).points for row in rows]
-    fewest = min(map(len, clouds))
-    if fewest < num_points:
-        raise ConfigError(f"--points {num_points}: a simulated cloud has only {fewest} distinct points")
-    labels = np.array([STATES.index(row.state) for row in rows], dtype=np.int64)
-    return Clouds(np.stack(clouds), labels)
+    return Clouds(*comparison_clouds(count, num_points))
 
 
 def dataset_clouds(folder: Path, count: int, num_points: int) -> Clouds:

@@ -19,7 +19,8 @@ from benchmarks.store import Group
 from benchmarks.tables import milliseconds
 from doorstate.clouds import preparation
 from doorstate.deployment import predictor
-from doorstate.deployment.onnx_export import LabelledClouds, export_onnx
+from doorstate.deployment.comparison_clouds import LabelledClouds
+from doorstate.deployment.onnx_export import export_onnx
 from doorstate.deployment.onnx_network import OnnxNetwork
 from doorstate.evaluation.table import Table
 from doorstate.jobs import Progress

@@ -12,7 +12,8 @@ import torch
 
 from doorstate.clouds.preparation import normalize, prepare_cloud
 from doorstate.deployment import onnx_export
-from doorstate.deployment.onnx_export import TOLERANCE, LabelledClouds, export_onnx
+from doorstate.deployment.comparison_clouds import LabelledClouds
+from doorstate.deployment.onnx_export import TOLERANCE, export_onnx
 from doorstate.deployment.onnx_network import OnnxNetwork
 from doorstate.deployment.torch_network import TorchNetwork
 from doorstate.errors import ExportError

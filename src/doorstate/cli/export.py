@@ -36,12 +36,8 @@ def export(
     """
     from doorstate.console import out as stdout
     from doorstate.console import progress_bar
-    from doorstate.deployment.onnx_export import (
-        TOLERANCE,
-        check_installed,
-        comparison_clouds,
-        export_onnx,
-    )
+    from doorstate.deployment.comparison_clouds import comparison_clouds
+    from doorstate.deployment.onnx_export import TOLERANCE, check_installed, export_onnx
     from doorstate.deployment.predictor import packaged_weights
     from doorstate.networks import network_class
     from doorstate.training.weights import load_weights

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
@@ -19,16 +19,15 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from doorstate import __version__
-from doorstate.clouds.preparation import SCALE_M, prepare_cloud
+from doorstate.clouds.preparation import SCALE_M
+from doorstate.deployment.comparison_clouds import LabelledClouds
 from doorstate.deployment.onnx_network import CARD, INPUT, OUTPUT, OnnxNetwork, heads_told
 from doorstate.deployment.torch_network import TorchNetwork
-from doorstate.errors import ConfigError, ExportError, not_installed, one_line
+from doorstate.errors import ExportError, not_installed, one_line
 from doorstate.files import atomic_path
 from doorstate.jobs import Progress, no_progress
 from doorstate.networks.base import PointNetwork
 from doorstate.networks.heads import STATE, answers
-from doorstate.simulation.frames import replay
-from doorstate.simulation.generate import PRESETS, draw_pose, pose_indices
 from doorstate.training.answers import Columns
 from doorstate.training.card import WeightsCard
 from doorstate.types import STATES, Points
@@ -39,7 +38,6 @@ if TYPE_CHECKING:
 OPSET = 18  # what torch's exporter is written in; newer ones are converted from it
 TOLERANCE = 1e-4  # of a probability
 _PACKAGES = ("onnx", "onnxscript", "onnxruntime")  # torch's exporter asks for the second
-_SEED = 1_000_003  # of clouds that no weights were trained on
 _ANY_SIZE = 2**30  # of a constant
 _JITTERS = 3
 _LAST_DIGIT = np.array([-(2.0**-23), 0.0, 2.0**-23], dtype=np.float32)  # of a float32, relative
@@ -68,13 +66,6 @@ class Comparison:
     clouds: int
     right: int  # states that the file tells as they are
     right_in_torch: int
-
-
-class LabelledClouds(NamedTuple):
-    """What to compare on."""
-
-    points: Points  # (M, n, 3) metres in farthest-point order
-    labels: NDArray[np.int64]  # (M,)
 
 
 class _Graph(nn.Module):
@@ -216,28 +207,6 @@ def rounding_in_torch(network: PointNetwork, card: WeightsCard, points: Points) 
             others.append(_in_columns(original.ask((cloud * jitter)[None])))
         furthest = max(furthest, *(float(np.abs(said - other).max()) for other in others))
     return furthest
-
-
-def comparison_clouds(count: int, num_points: int, progress: Progress = no_progress) -> LabelledClouds:
-    """Simulated doors in all three states, drawn for no training.
-
-    Raises:
-        ConfigError: more points than a simulated cloud has.
-    """
-    rows = [
-        row
-        for pose in pose_indices(max(3, -(-count // len(STATES))))
-        for row in draw_pose(PRESETS["ogurob"], _SEED, pose)
-    ][:count]
-    clouds: list[Points] = []
-    for row in rows:
-        clouds.append(prepare_cloud(replay(row).points, num_points, thin=True).points)
-        progress(len(clouds), count)
-    fewest = min(map(len, clouds))
-    if fewest < num_points:
-        raise ConfigError(f"--points {num_points}: a simulated cloud has only {fewest} distinct points")
-    labels = np.array([STATES.index(row.state) for row in rows], dtype=np.int64)
-    return LabelledClouds(np.stack(clouds), labels)
 
 
 def _model(network: PointNetwork, card: WeightsCard, num_points: int, opset: int) -> ModelProto:
