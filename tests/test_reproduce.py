@@ -4,14 +4,17 @@
 from __future__ import annotations
 
 import importlib.util
+import json
 import sys
 import tomllib
 from pathlib import Path
 from types import ModuleType
 
+import numpy as np
 import pytest
 
-from doorstate.dataset.store import PreparedDataset
+from doorstate.dataset.splits import Role, write_splits
+from doorstate.dataset.store import PreparedDataset, open_dataset
 from doorstate.simulation.settings import settings_for
 from doorstate.training.comparison import compare, load_experiment
 from doorstate.training.run_folder import RunFolder
@@ -37,7 +40,9 @@ def test_everything_published_follows_from_the_committed_predictions(reproduce: 
     assert reproduce.check() is None
 
 
-def test_publishing_takes_what_is_small_of_finished_runs(reproduce: ModuleType, tmp_path: Path) -> None:
+def test_publishing_takes_what_is_small_of_finished_runs(
+    reproduce: ModuleType, small_dataset: PreparedDataset, tmp_path: Path
+) -> None:
     source = tmp_path / "runs"
     for fold in (0, 1):
         run = RunFolder(source / "runs" / "pointnet" / f"fold{fold}")
@@ -45,16 +50,24 @@ def test_publishing_takes_what_is_small_of_finished_runs(reproduce: ModuleType, 
         run.path.joinpath("weights.safetensors").write_bytes(b"large")
         run.path.joinpath("checkpoint.pt").write_bytes(b"larger")
     RunFolder(source / "runs" / "pointnet" / "fold1").finish({"test_macro_f1": 1.0})
-    (source / "comparison.json").write_text("{}")
+    tested = [row["sample_id"] for row in small_dataset.rows[3:9]]
+    roles: dict[str, Role] = {row["sample_id"]: "train" for row in small_dataset.rows}
+    write_splits(source / "splits.csv", [roles | dict.fromkeys(tested, "test"), dict.fromkeys(roles, "test")])
+    (source / "comparison.json").write_text(json.dumps({"dataset": str(small_dataset.folder), "folds": 1}))
     (source / "report").mkdir()
     (source / "report" / "report.html").write_text("made anew")
-    reproduce.publish(source, tmp_path / "results")
-    published = [path for path in (tmp_path / "results").rglob("*") if path.is_file()]
-    names = sorted(str(path.relative_to(tmp_path / "results")) for path in published)
+    target = tmp_path / "results" / "trial"
+    reproduce.publish(source, target)
+    rows = open_dataset(tmp_path / "results" / small_dataset.folder.name)
+    assert [row["sample_id"] for row in rows.rows] == tested
+    assert np.array_equal(rows.cloud(0), small_dataset.cloud(3)), "replayed"
+    published = [path for path in target.rglob("*") if path.is_file()]
+    names = sorted(str(path.relative_to(target)) for path in published)
     folder = "runs/pointnet/fold1"
     assert names == [
         "comparison.json",
         *(f"{folder}/{name}" for name in ("config.json", "environment.json", "metrics.json")),
+        "splits.csv",
     ]
 
 

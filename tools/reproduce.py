@@ -11,7 +11,6 @@ python tools/reproduce.py check                # the same into a scratch folder:
 from __future__ import annotations
 
 import multiprocessing
-import shutil
 import sys
 import tempfile
 import tomllib
@@ -21,15 +20,12 @@ from pathlib import Path
 
 from data_sets import commands
 from doorstate_command import REPOSITORY, doorstate
+from published import publish, rows_of
 
 RESULTS, RUNS, EXPERIMENTS = REPOSITORY / "results", REPOSITORY / "runs", REPOSITORY / "experiments"
-ROWS = RESULTS / "ogurob-4096"  # the data set without its clouds, which are replayed from the rows
 PAGES = (Path("docs") / "results.md", Path("docs") / "related.md")
 STUDIES = {"transfer": "tested", "resolution": "points"}  # commands, and what only their files say
 BESIDE = {"related": "paper"}  # is shown beside the methods of another comparison
-
-# What `publish` leaves behind: large, or of use only to a running training.
-_NOT_PUBLISHED = ("*.safetensors", "*.pt", "position.txt", "report")
 
 
 def main(arguments: list[str]) -> None:
@@ -62,18 +58,6 @@ def run(name: str) -> None:
     doorstate(f"{study or 'compare'} experiments/{name}.toml --jobs 2")
     if study is None and asked.get("protocol") != "all":
         doorstate(f"report runs/{name}")
-
-
-def publish(source: Path, target: Path) -> None:
-    """Copy what is small of every finished run; unfinished ones are left out."""
-    if not source.is_dir():
-        sys.exit(f"{source}: no such folder; run it first")
-
-    def skipped(folder: str, names: list[str]) -> set[str]:
-        left = set(shutil.ignore_patterns(*_NOT_PUBLISHED)(folder, names))
-        return set(names) if "config.json" in names and "metrics.json" not in names else left
-
-    shutil.copytree(source, target, ignore=skipped, dirs_exist_ok=True)
 
 
 def again(network: str, fold: int, name: str = "paper") -> str | None:
@@ -119,6 +103,7 @@ def build(root: Path) -> None:
     from results_page import write_pages
 
     from doorstate.evaluation.resolution import write_resolution
+    from doorstate.evaluation.transfer import load_transfer_results, write_transfer
     from doorstate.jobs import default_workers
 
     # spawn: a forked child of a process that runs BLAS threads can hang.
@@ -126,8 +111,14 @@ def build(root: Path) -> None:
         for report in [pool.submit(_report, root, *each) for each in _comparisons()]:
             report.result()
     if (RESULTS / "resolution").is_dir():
-        write_resolution(RESULTS / "resolution", root / "results" / "resolution" / "report", ROWS)
-    write_pages(RESULTS, ROWS, root / "results", *(root / page for page in PAGES))
+        rows = rows_of(RESULTS / "paper", RESULTS)
+        write_resolution(RESULTS / "resolution", root / "results" / "resolution" / "report", rows)
+    for folder in RESULTS.glob("*/"):
+        study = EXPERIMENTS / f"{folder.name}.toml"
+        if study.is_file() and "tested" in (asked := tomllib.loads(study.read_text(encoding="utf-8"))):
+            found = load_transfer_results(folder, tuple(asked["trained"]), tuple(asked["tested"]), RESULTS)
+            write_transfer(found, root / "results" / folder.name / "report")
+    write_pages(RESULTS, root / "results", *(root / page for page in PAGES))
 
 
 def check() -> str | None:
@@ -158,7 +149,8 @@ def check() -> str | None:
 def _report(root: Path, folders: list[Path], folds: int) -> None:
     from doorstate.evaluation.report import write_everything
 
-    write_everything(folders, root / "results" / folders[-1].name / "report", ROWS, folds)
+    out = root / "results" / folders[-1].name / "report"
+    write_everything(folders, out, rows_of(folders[-1], RESULTS), folds)
 
 
 def _comparisons() -> Iterator[tuple[list[Path], int]]:

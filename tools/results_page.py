@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from published import rows_of
 from templates import template
 
 from doorstate.clouds.preparation import NUM_POINTS
@@ -31,6 +32,7 @@ from doorstate.types import STATES
 # Semi-open doors are open by 15 to 65 degrees in this data set, open ones by 75 to 115 (docs/data-card.md).
 BORDER_DEG, NEAR_DEG = (15.0, 65.0, 75.0), 5.0
 NEARBY_M = 2.0
+SHOWN = ("paper", "by-pose", "authors", "related")  # what the page is about, or costs beside it
 ASKED = 0.995  # macro-F1 that every network should reach
 BENCHMARK = Path(__file__).resolve().parents[1] / "docs" / "benchmarks" / "networks.json"
 NAMES = {
@@ -98,24 +100,20 @@ class Published:
         return int(row[STATES.index(state)]), int(row.sum())
 
 
-def write_pages(
-    results_folder: Path, rows_folder: Path, reports_folder: Path, results_page: Path, related_page: Path
-) -> None:
+def write_pages(results_folder: Path, reports_folder: Path, results_page: Path, related_page: Path) -> None:
     """Render both pages; that of the related work once it is published beside the paper's networks.
 
     Args:
-        results_folder: holds one folder for each published experiment.
-        rows_folder: the data set, rows alone.
+        results_folder: holds one folder for each published experiment, and one for each data set, rows alone.
         reports_folder: holds `<experiment>/report` of each complete one, made before.
         results_page: of the five networks.
         related_page: of the methods beside them.
     """
-    folders = [path.parent for path in sorted(results_folder.glob("*/comparison.json"))]
+    found = [path.parent for path in sorted(results_folder.glob("*/comparison.json"))]
+    folders = [folder for folder in found if folder.name in SHOWN]
     waiting = {folder.name: unfinished_runs(folder) for folder in folders}
     published = {
-        folder.name: _published([folder], rows_folder, reports_folder)
-        for folder in folders
-        if whole_folds(folder)
+        folder.name: _published([folder], reports_folder) for folder in folders if whole_folds(folder)
     }
     resolution = results_folder / "resolution"
     _render(
@@ -127,13 +125,15 @@ def write_pages(
         gap=_both(published, "by-pose", gap_table),
         cuts=_both(published, "authors", lambda paper, authors: cuts_table(authors, paper)),
         asked=ASKED,
-        resolution=_table(resolution_table(load_resolution(resolution, rows_folder)))
+        resolution=_table(
+            resolution_table(load_resolution(resolution, rows_of(results_folder / "paper", results_folder)))
+        )
         if resolution.is_dir()
         else None,
     )
     if "paper" in published and "related" in published:
         both = [results_folder / name for name in ("paper", "related")]
-        _render("related.md.j2", related_page, all=_published(both, rows_folder, reports_folder))
+        _render("related.md.j2", related_page, all=_published(both, reports_folder))
 
 
 def _both(
@@ -265,7 +265,8 @@ def _near_the_border(opening_angle_deg: float) -> bool:
     return min(abs(opening_angle_deg - border) for border in BORDER_DEG) <= NEAR_DEG
 
 
-def _published(folders: Sequence[Path], rows_folder: Path, reports_folder: Path) -> Published:
+def _published(folders: Sequence[Path], reports_folder: Path) -> Published:
+    rows_folder = rows_of(folders[0], folders[0].parent)
     results = load_joined(folders, rows_folder, min(whole_folds(folder) for folder in folders))
     tables = reports_folder / folders[-1].name / "report" / "tables"
     confusion = {network: pooled_confusion(results, network) for network in results.networks}

@@ -49,7 +49,8 @@ def publish(simulated: PreparedDataset, make_comparison: MakeComparison, tmp_pat
 def write(pages: ModuleType, simulated: PreparedDataset, tmp_path: Path) -> tuple[str, str]:
     results, related = tmp_path / "results.md", tmp_path / "related.md"
     root = tmp_path / "results"
-    pages.write_pages(root, simulated.folder, root, results, related)
+    (root / simulated.folder.name).symlink_to(simulated.folder)
+    pages.write_pages(root, root, results, related)
     return results.read_text(), related.read_text() if related.exists() else ""
 
 

@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
 
+from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import RunError
 from doorstate.evaluation.transfer import (
     TransferResults,
@@ -14,6 +16,8 @@ from doorstate.evaluation.transfer import (
     transfer_figure,
     transfer_table,
 )
+
+from .conftest import MakeComparison
 
 RESULTS = TransferResults(
     networks=("pointnet", "dgcnn"),
@@ -51,3 +55,22 @@ def test_the_figure_says_what_the_table_says() -> None:
 def test_an_empty_folder_is_refused(tmp_path: Path) -> None:
     with pytest.raises(RunError, match="no finished part"):
         load_transfer_results(tmp_path, ("a",), ("x",))
+
+
+def test_cells_are_read_with_the_data_sets_that_lie_beside_them(
+    simulated: PreparedDataset, make_comparison: MakeComparison, tmp_path: Path
+) -> None:
+    wrong = {"pointnet": {simulated.rows[0]["sample_id"]: "open"}}
+    folder = make_comparison(simulated, wrong, ("pointnet",))
+    (tmp_path / "s" / "a").mkdir(parents=True)
+    cell = folder.rename(tmp_path / "s" / "a" / "x")
+    asked = json.loads((cell / "comparison.json").read_text())
+    (cell / "comparison.json").write_text(json.dumps(asked | {"dataset": "gone/doors-160"}))
+    with pytest.raises(RunError, match=r"no manifest\.csv"):
+        load_transfer_results(tmp_path / "s", ("a",), ("x", "y"))
+    (tmp_path / "published").mkdir()
+    (tmp_path / "published" / "doors-160").symlink_to(simulated.folder)
+    found = load_transfer_results(tmp_path / "s", ("a",), ("x", "y"), tmp_path / "published")
+    assert found.samples == {"x": len(simulated)}
+    assert found.macro_f1["pointnet", "a", "x"] == pytest.approx(1 - 1 / len(simulated), abs=1e-4)
+    assert found.trainings("pointnet") == ("a",)

@@ -17,6 +17,7 @@ from doorstate.evaluation.results import load_results
 from doorstate.evaluation.score_tables import pooled_confusion
 from doorstate.evaluation.table import Table, number
 from doorstate.evaluation.tables import save_tables
+from doorstate.training.run_folder import read_json
 
 _NAN = float("nan")
 
@@ -40,13 +41,16 @@ class TransferResults:
         )
 
 
-def load_transfer_results(folder: Path, trained: Sequence[str], tested: Sequence[str]) -> TransferResults:
+def load_transfer_results(
+    folder: Path, trained: Sequence[str], tested: Sequence[str], datasets_folder: Path | None = None
+) -> TransferResults:
     """Read the comparisons of a study; what is not there yet is left out.
 
     Args:
         folder: of the study, which holds `<trained>/<tested>/`.
         trained: names, in the order of rows.
         tested: names, in the order of columns.
+        datasets_folder: holds the data sets by the last part of their names, if they are not where comparisons say.
 
     Raises:
         RunError: nothing is there, or a comparison cannot be used.
@@ -59,7 +63,8 @@ def load_transfer_results(folder: Path, trained: Sequence[str], tested: Sequence
             cell = folder / row / column
             if not any(cell.glob("runs/*/*/predictions.csv")):
                 continue
-            results = load_results(cell)
+            dataset = Path(read_json(cell / "comparison.json")["dataset"]).name
+            results = load_results(cell, None if datasets_folder is None else datasets_folder / dataset)
             for network in results.networks:
                 networks[network] = None
                 confusion = pooled_confusion(results, network)
