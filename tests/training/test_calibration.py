@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.special import log_softmax, softmax
 
-from doorstate.training.calibration import at_temperature, fit_temperature
+from doorstate.training.calibration import abstain_threshold, at_temperature, fit_temperature
 
 
 def drawn(temperature: float, samples: int = 20_000) -> tuple[np.ndarray, np.ndarray]:
@@ -60,3 +60,23 @@ def test_a_probability_of_zero_is_no_error() -> None:
     scaled = at_temperature(np.array([[1.0, 0.0, 0.0]]), 2.0)
     assert np.isfinite(scaled).all()
     assert scaled.sum() == pytest.approx(1)
+
+
+@given(
+    st.lists(st.tuples(st.sampled_from([0.4, 0.5, 0.6, 0.9]), st.booleans()), min_size=1, max_size=30),
+    st.sampled_from([0.0, 0.1, 0.5, 1.0]),
+)
+def test_the_threshold_keeps_as_many_answers_as_it_may(
+    answers: list[tuple[float, bool]], error_share: float
+) -> None:
+    sure = np.array([each for each, _ in answers])
+    right = np.array([each for _, each in answers])
+    probabilities = np.stack([sure, (1 - sure) / 2, (1 - sure) / 2], axis=1)
+    found = abstain_threshold(probabilities, np.where(right, 0, 1), error_share)
+    kept = sure >= found
+    assert (~right[kept]).sum() <= error_share * kept.sum()
+    for lower in [0.0, *sure[sure < found]]:
+        more = sure >= lower
+        if more.sum() > kept.sum():
+            assert (~right[more]).sum() > error_share * more.sum()
+    assert 0 <= found < 1

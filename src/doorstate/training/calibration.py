@@ -41,3 +41,25 @@ def at_temperature(probabilities: Probabilities, temperature: float) -> Probabil
     powers = np.exp(logits - logits.max(axis=-1, keepdims=True))
     scaled: Probabilities = powers / powers.sum(axis=-1, keepdims=True)
     return scaled
+
+
+def abstain_threshold(probabilities: Probabilities, labels: NDArray[np.int64], error_share: float) -> float:
+    """Least probability of an answer from which on no more than a share of all answers are wrong; 0 if all may stay.
+
+    One that no answer reaches, if even the surest are wrong too often.
+
+    Args:
+        probabilities: (M, C) of samples that the weights were not fitted to.
+        labels: (M,) true classes.
+        error_share: of the answers that are still given.
+    """
+    sure = probabilities.max(axis=1)
+    order = np.argsort(-sure, kind="stable")
+    wrong = (probabilities.argmax(axis=1) != labels)[order].cumsum()
+    given = np.arange(1, len(sure) + 1)
+    # Answers of the same probability stay or go together.
+    last_of_equals = np.append(sure[order][1:] < sure[order][:-1], True)
+    allowed = np.flatnonzero(last_of_equals & (wrong <= error_share * given))
+    if len(allowed) == 0:
+        return float(np.nextafter(sure.max(initial=0.0), 1))
+    return 0.0 if allowed[-1] == len(sure) - 1 else float(sure[order][allowed[-1]])
