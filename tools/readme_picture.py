@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 
 from doorstate.dataset.store import open_dataset
 from doorstate.evaluation.samples_figure import draw_cloud
+from doorstate.evaluation.views import picture_axes
 from doorstate.types import STATES
 
 
@@ -22,8 +23,7 @@ def main(folder: str, pose: str, target: str) -> None:
     figure = Figure(figsize=(9.6, 4.6), layout="constrained")
     axes = figure.subplots(2, len(STATES), height_ratios=(1.15, 1))
     for axis in axes.ravel():
-        axis.set(xticks=[], yticks=[])
-        axis.spines[:].set_visible(False)
+        picture_axes(axis)
     for column, state in enumerate(STATES):
         index = dataset.index_of(f"{pose}-{state}")
         axes[0, column].imshow(dataset.image(index))

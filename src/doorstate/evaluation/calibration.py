@@ -12,6 +12,7 @@ from matplotlib.lines import Line2D
 from doorstate.evaluation.metrics import Floats, mean_and_deviation, ratio
 from doorstate.evaluation.results import ComparisonResults
 from doorstate.evaluation.table import Table, mean_deviation, number
+from doorstate.evaluation.views import graph_axes
 from doorstate.training.calibration import at_temperature, fit_temperature
 from doorstate.types import Indices
 
@@ -132,8 +133,7 @@ def reliability_figure(results: ComparisonResults) -> Figure | None:
         upper.set(title=network, xlim=(0, 1.02), ylim=(-0.02, 1.05), aspect="auto")
         lower.set(xlabel="probability of the answer", yscale="log")
         for axis in (upper, lower):
-            axis.grid(alpha=0.25)
-            axis.spines[["top", "right"]].set_visible(False)
+            graph_axes(axis)
     grid[0, 0].set_ylabel("share of right answers")
     grid[1, 0].set_ylabel("answers")
     handles = [Line2D([], [], color=color, marker="o", markersize=4) for color in (_RAW, _SCALED)]

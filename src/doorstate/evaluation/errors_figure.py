@@ -14,6 +14,7 @@ from doorstate.evaluation.found_shapes import draw_shapes
 from doorstate.evaluation.gallery import order_of_errors
 from doorstate.evaluation.results import ComparisonResults, ErrorRow
 from doorstate.evaluation.samples_figure import draw_cloud
+from doorstate.evaluation.views import picture_axes
 from doorstate.types import NO_ANSWER
 
 _COLUMNS = 5
@@ -61,8 +62,7 @@ def _grid(lines: int) -> tuple[Figure, Sequence[Sequence[Axes]]]:
     figure = Figure(figsize=(2.5 * _COLUMNS + 0.3, 3.9 * lines), layout="constrained")
     axes = figure.subplots(2 * lines, _COLUMNS, squeeze=False)
     for axis in axes.ravel():
-        axis.set(xticks=[], yticks=[])
-        axis.spines[:].set_visible(False)
+        picture_axes(axis)
     return figure, axes.tolist()
 
 

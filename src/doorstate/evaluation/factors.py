@@ -15,6 +15,7 @@ from doorstate.evaluation.metrics import Floats
 from doorstate.evaluation.results import ComparisonResults
 from doorstate.evaluation.stratum_tables import rows_of
 from doorstate.evaluation.table import Table, number
+from doorstate.evaluation.views import graph_axes
 from doorstate.types import Indices
 
 _FEWEST = 10  # samples of a bin that is drawn
@@ -161,8 +162,7 @@ def factors_figure(results: ComparisonResults, dataset: PreparedDataset) -> Figu
                 label=method,
             )
         axis.set_xlabel(title)
-        axis.grid(alpha=0.25)
-        axis.spines[["top", "right"]].set_visible(False)
+        graph_axes(axis)
     for axis in axes[: len(titles) : 2]:
         axis.set_ylabel("accuracy")
     handles, labels = axes[0].get_legend_handles_labels()

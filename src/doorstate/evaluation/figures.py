@@ -24,6 +24,7 @@ from doorstate.evaluation.plan_figures import error_map, poses_figure
 from doorstate.evaluation.results import ComparisonResults, Run
 from doorstate.evaluation.samples_figure import samples_figure
 from doorstate.evaluation.score_tables import answers_given, f1_intervals, fold_f1, pooled_confusion
+from doorstate.evaluation.views import graph_axes
 from doorstate.files import atomic_path
 from doorstate.types import STATES
 
@@ -139,8 +140,7 @@ def spread_figure(results: ComparisonResults, dataset: PreparedDataset) -> Figur
         axis.plot(pooled, line, "D", color=_TRAINING, markersize=6)
     axis.set(xlabel="macro F1", yticks=range(len(networks)), ylim=(len(networks) - 0.5, -0.5))
     axis.set_yticklabels(networks)
-    axis.grid(axis="x", alpha=0.25)
-    axis.spines[["top", "right"]].set_visible(False)
+    graph_axes(axis, "x")
     handles = [
         Line2D([], [], marker="D", linestyle="", color=_TRAINING),
         Line2D([], [], color=_TRAINING, linewidth=5, alpha=0.35),

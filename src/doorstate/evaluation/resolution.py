@@ -6,7 +6,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from doorstate.errors import RunError
@@ -16,7 +15,7 @@ from doorstate.evaluation.results import load_results
 from doorstate.evaluation.score_tables import pooled_confusion
 from doorstate.evaluation.table import Table, number
 from doorstate.evaluation.tables import save_tables
-from doorstate.evaluation.views import NETWORK_COLORS
+from doorstate.evaluation.views import NETWORK_COLORS, graph_axes
 from doorstate.files import read_csv
 from doorstate.training.resolution import AS_TRAINED, FINE_TUNED
 
@@ -141,7 +140,7 @@ def resolution_figure(results: ResolutionResults) -> Figure:
         textcoords="offset points",
     )
     for axis in (by_points, by_time):
-        _tidy(axis)
+        graph_axes(axis)
     by_points.legend(frameon=False, fontsize=8)
     return figure
 
@@ -161,8 +160,3 @@ def write_resolution(folder: Path, out_folder: Path, dataset_folder: Path | None
     save_tables({"resolution": resolution_table(results)}, out_folder / "tables")
     save_drawings(encode_figures({"resolution": resolution_figure(results)}), out_folder / "figures")
     return out_folder
-
-
-def _tidy(axis: Axes) -> None:
-    axis.grid(alpha=0.25)
-    axis.spines[["top", "right"]].set_visible(False)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from doorstate.dataset.store import PreparedDataset
 from doorstate.dataset.strata import REGIONS
 from doorstate.evaluation.stratum_tables import has_strata, is_undecidable
-from doorstate.evaluation.views import PART_COLORS, REGION_COLORS, oblique_view, point_colors
+from doorstate.evaluation.views import PART_COLORS, REGION_COLORS, oblique_view, picture_axes, point_colors
 from doorstate.types import STATES, Part
 
 _MIDDLE_M = 2.25
@@ -32,8 +32,7 @@ def samples_figure(dataset: PreparedDataset) -> Figure:
     figure = Figure(figsize=(2.3 * len(regions) + 0.4, height), layout="constrained")
     axes = figure.subplots(lines_per_state * len(STATES), len(regions), squeeze=False)
     for axis in axes.ravel():
-        axis.set(xticks=[], yticks=[])
-        axis.spines[:].set_visible(False)
+        picture_axes(axis)
     for s, state in enumerate(STATES):
         first = lines_per_state * s
         axes[first, 0].set_ylabel(state, fontsize=11)

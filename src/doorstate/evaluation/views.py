@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How clouds, states and regions look in every picture: colours and one oblique view."""
+"""How clouds, states, regions and axes look in every picture: colours and one oblique view."""
 
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING, Literal
 
 import matplotlib as mpl
 import numpy as np
@@ -11,6 +12,9 @@ from matplotlib.colors import Normalize, to_rgba_array
 from numpy.typing import NDArray
 
 from doorstate.types import Part, Points
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 # Okabe & Ito's colour-blind-safe set, with a deeper red so that the paper's region names fit what is seen.
 REGION_COLORS = {
@@ -88,3 +92,15 @@ def point_colors(points: Points, parts: NDArray[np.uint8] | None) -> NDArray[np.
         return np.asarray(mpl.colormaps["viridis"](height))
     palette = to_rgba_array([PART_COLORS[Part(part)] for part in np.unique(parts)])
     return np.asarray(palette[np.unique(parts, return_inverse=True)[1]])
+
+
+def graph_axes(axis: Axes, grid: Literal["both", "x", "y"] = "both") -> None:
+    """Give a graph a faint grid and no frame above and to the right."""
+    axis.grid(axis=grid, alpha=0.25)
+    axis.spines[["top", "right"]].set_visible(False)
+
+
+def picture_axes(axis: Axes) -> None:
+    """Give a picture neither ticks nor frame."""
+    axis.set(xticks=[], yticks=[])
+    axis.spines[:].set_visible(False)
