@@ -1,6 +1,6 @@
 # make setup: everything into .venv; make demo: the whole pipeline, small; make check, make test: before you commit.
 # make test-ros2: the ROS 2 node, live, with ROS from PyPI in an environment of its own.
-# make docs: the site, in build/site; make fresh-install: the wheel as a new user gets it, timed.
+# make docs: the site, in build/site; make fresh-install: wheel and sdist as a new user gets them, timed.
 # make reproduce: the paper's comparison from nothing (EXPERIMENT=by-pose: that file of experiments/);
 # make publish: what EXPERIMENT gave, and all that follows from it, into results/ and docs/;
 # make reproduce-check: are all published tables and figures what the committed predictions give?
