@@ -17,6 +17,18 @@ from doorstate.simulation.manifest import numbers
 from doorstate.types import NO_DOOR, Part
 
 _SURE = 0.5  # from here on a probability is a yes
+_ERRORS = {
+    "door, AUROC": 4,
+    "opening angle, semi-open: mean error, °": 1,
+    "open": 1,
+    "hinge side": 4,
+    "frame position: median error, m": 3,
+    "90th percentile": 3,
+    "yaw: median error, °": 1,
+    "opening width: mean error, m": 3,
+    "passable width: mean error, m": 3,
+}
+"""Columns of `answers_table`, and their digits."""
 
 
 def answers_table(results: ComparisonResults, dataset: PreparedDataset) -> Table:
@@ -25,27 +37,50 @@ def answers_table(results: ComparisonResults, dataset: PreparedDataset) -> Table
     for method in results.networks:
         given = results.answers(method)
         if given is not None:
-            rows.append(
-                (method, str(len(given.sample_ids)), *(number(v, d) for v, d in _errors(given, dataset)))
-            )
+            found = answer_errors(given, dataset)
+            cells = (number(found[name], digits) for name, digits in _ERRORS.items())
+            rows.append((method, str(len(given.sample_ids)), *cells))
     return Table(
         "Answers of further heads",
-        (
-            "network",
-            "samples",
-            "door, AUROC",
-            "opening angle, semi-open: mean error, °",
-            "open",
-            "hinge side",
-            "frame position: median error, m",
-            "90th percentile",
-            "yaw: median error, °",
-            "opening width: mean error, m",
-            "passable width: mean error, m",
-        ),
+        ("network", "samples", *_ERRORS),
         tuple(rows),
         "AUROC: how well the probability of a door puts samples with a door above those without. Hinge: share right.",
     )
+
+
+def answer_errors(given: Answers, dataset: PreparedDataset) -> dict[str, float]:
+    """Figures of a row of `answers_table` by column, NaN where nothing is known or nothing was said.
+
+    Args:
+        given: what one network says.
+        dataset: that the samples are of.
+    """
+    manifest = rows_of(dataset, given)
+
+    def off(name: str, *others: str) -> Floats:
+        return np.abs(given.columns.get(name, math.nan) - numbers(manifest, name, *others))
+
+    state = np.array([row["state"] for row in manifest])
+    angle = off("opening_angle_deg")
+    hinge = np.array([row.get("hinge") or row.get("door.hinge", "") for row in manifest])
+    said_left = given.columns.get("p_hinge_left", np.full(len(state), math.nan))
+    hinge_right = (said_left >= _SURE) == (hinge == "left")
+    place = np.hypot(off("door_x_m"), off("door_y_m"))
+    turn = np.abs(
+        (given.columns.get("door_yaw_deg", math.nan) - numbers(manifest, "door_yaw_deg") + 180) % 360 - 180
+    )
+    found = (
+        _auroc(given, state),
+        _mean(angle[state == "semi_open"]),
+        _mean(angle[state == "open"]),
+        _mean(hinge_right[(hinge != "") & ~np.isnan(said_left)].astype(float)),
+        _quantile(place, 0.5),
+        _quantile(place, 0.9),
+        _quantile(turn, 0.5),
+        _mean(off("opening_width_m", "door.opening_width_m")),
+        _mean(off("passable_width_m")),
+    )
+    return dict(zip(_ERRORS, found, strict=True))
 
 
 def presence_table(results: ComparisonResults, dataset: PreparedDataset) -> Table:
@@ -88,35 +123,6 @@ def parts_table(results: ComparisonResults) -> Table:
         rows.append((method, *(number(float(share), 3) for share in shares), number(mean, 3)))
     columns = ("network", *(part.name.lower() for part in parts), "mean")
     return Table("Parts of points: intersection over union", columns, tuple(rows))
-
-
-def _errors(given: Answers, dataset: PreparedDataset) -> list[tuple[float, int]]:
-    """Figures of a row of `answers_table`, each with its digits."""
-    manifest = rows_of(dataset, given)
-
-    def off(name: str, *others: str) -> Floats:
-        return np.abs(given.columns.get(name, math.nan) - numbers(manifest, name, *others))
-
-    state = np.array([row["state"] for row in manifest])
-    angle = off("opening_angle_deg")
-    hinge = np.array([row.get("hinge") or row.get("door.hinge", "") for row in manifest])
-    said_left = given.columns.get("p_hinge_left", np.full(len(state), math.nan))
-    hinge_right = (said_left >= _SURE) == (hinge == "left")
-    place = np.hypot(off("door_x_m"), off("door_y_m"))
-    turn = np.abs(
-        (given.columns.get("door_yaw_deg", math.nan) - numbers(manifest, "door_yaw_deg") + 180) % 360 - 180
-    )
-    return [
-        (_auroc(given, state), 4),
-        (_mean(angle[state == "semi_open"]), 1),
-        (_mean(angle[state == "open"]), 1),
-        (_mean(hinge_right[(hinge != "") & ~np.isnan(said_left)].astype(float)), 4),
-        (_quantile(place, 0.5), 3),
-        (_quantile(place, 0.9), 3),
-        (_quantile(turn, 0.5), 1),
-        (_mean(off("opening_width_m", "door.opening_width_m")), 3),
-        (_mean(off("passable_width_m")), 3),
-    ]
 
 
 def _auroc(given: Answers, state: np.ndarray) -> float:
