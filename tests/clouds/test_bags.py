@@ -4,8 +4,10 @@
 from __future__ import annotations
 
 import io
+import sqlite3
 import struct
 import sys
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +30,7 @@ from benchmarks.bags import (
     write_bag,
 )
 
+from doorstate.clouds import bag_limits
 from doorstate.clouds.bags import BagTopic, StampedCloud, open_bag
 from doorstate.clouds.camera import Intrinsics, Pinhole
 from doorstate.clouds.depth import depth_to_points
@@ -105,19 +108,82 @@ def test_one_file_of_a_ros2_folder_is_enough(kind: str, tmp_path: Path) -> None:
     assert "has no metadata.yaml" in complaint(folder)
 
 
-@pytest.mark.parametrize(
-    ("kind", "compression"),
-    [("bag", "LZ4"), ("bag", "BZ2"), ("db3", "MESSAGE"), ("db3", "FILE"), ("mcap", "STORAGE")],
-)
+COMPRESSED = [("bag", "LZ4"), ("bag", "BZ2"), ("db3", "MESSAGE"), ("mcap", "STORAGE")]
+
+
+@pytest.mark.parametrize(("kind", "compression"), [*COMPRESSED, ("db3", "FILE")])
 def test_compressed_bags_are_read(kind: str, compression: str, tmp_path: Path) -> None:
     path = write_bag(tmp_path, kind, [cloud("/points", ORGANIZED)], compression)
     np.testing.assert_array_equal(read_one(path), ORGANIZED)
 
 
-def test_one_file_of_a_folder_with_compressed_messages_says_so(tmp_path: Path) -> None:
+def test_one_file_of_a_folder_with_compressed_messages_is_enough(tmp_path: Path) -> None:
     folder = write_bag(tmp_path, "db3", [cloud("/points", ORGANIZED)], "MESSAGE")
-    with pytest.raises(CloudReadError, match="is compressed: give the folder"):
-        read_one(folder / f"{folder.name}.db3")
+    np.testing.assert_array_equal(read_one(folder / f"{folder.name}.db3"), ORGANIZED)
+
+
+@pytest.mark.parametrize(("kind", "compression"), COMPRESSED)
+def test_what_unpacks_to_more_than_a_message_holds_is_refused(
+    kind: str, compression: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = write_bag(tmp_path, kind, [cloud("/points", np.zeros((60, 80, 3)))], compression)
+    monkeypatch.setattr(bag_limits, "MAX_UNPACKED", 2000)
+    with pytest.raises(CloudReadError, match="unpacks to more than"):
+        read_one(path)
+
+
+@pytest.mark.parametrize(("kind", "compression"), COMPRESSED)
+def test_what_is_packed_must_end(
+    kind: str, compression: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = write_bag(tmp_path, kind, [cloud("/points", ORGANIZED)], compression)
+    unpack = bag_limits._unpack
+    monkeypatch.setattr(bag_limits, "_unpack", lambda new, packed: unpack(new, packed[:-5]))
+    with pytest.raises(CloudReadError, match="what is packed does not end"):
+        read_one(path)
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ("UPDATE messages SET timestamp = NULL", "damaged from here on"),
+        ("UPDATE messages SET timestamp = 'now'", "damaged, or no bag"),
+        ("UPDATE messages SET data = 'text'", "damaged message"),
+        ("UPDATE topics SET name = X'ff'", "none of its 0 topics"),
+        ("UPDATE topics SET type = 3", "none of its 1 topics"),
+        # A view computes whatever it likes, without end.
+        (
+            "DROP TABLE schema; CREATE VIEW schema AS WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n)"
+            " SELECT i AS schema_version FROM n WHERE i < 0",
+            "damaged, or no bag",
+        ),
+    ],
+)
+def test_a_database_holds_what_it_likes(change: str, reason: str, tmp_path: Path) -> None:
+    folder = write_bag(tmp_path, "db3", [cloud("/points", ORGANIZED)])
+    file = folder / f"{folder.name}.db3"
+    with closing(sqlite3.connect(file)) as database:
+        database.executescript(_LOOSE + change)
+        database.commit()
+    with pytest.raises(CloudReadError, match=reason):
+        read_one(file)
+
+
+# The same tables as recorders make, without NOT NULL and types.
+_LOOSE = """
+CREATE TABLE new AS SELECT * FROM messages; DROP TABLE messages; ALTER TABLE new RENAME TO messages;
+CREATE TABLE new AS SELECT * FROM topics; DROP TABLE topics; ALTER TABLE new RENAME TO topics;
+"""
+
+
+@pytest.mark.parametrize(
+    "added", ["  x: [&a 1, *a]", "  x: &a [1]\n  y: {<<: *a}"], ids=["an alias", "a merge of one"]
+)
+def test_metadata_that_refer_to_themselves_are_refused(added: str, tmp_path: Path) -> None:
+    folder = write_bag(tmp_path, "mcap", [cloud("/points", ORGANIZED)])
+    metadata = folder / "metadata.yaml"
+    metadata.write_text(metadata.read_text() + f"{added}\n")
+    assert "refers to itself" in complaint(folder)
 
 
 def test_a_zero_stamp_gives_way_to_the_time_of_recording(tmp_path: Path) -> None:

@@ -80,6 +80,13 @@ BAD_FILES = {
         '{"width": 640.5, "height": 480, "fx": 1, "fy": 1, "cx": 1, "cy": 1}',
         "whole pixels",
     ),
+    # Nine lines of merges would be a billion entries.
+    "merged.yaml": ("{a: &a {fx: 1}, b: {<<: [*a, *a]}}", "refers to itself"),
+    "long.json": (" " * 40_000, "larger than 32 KiB"),
+    "digits.json": (
+        '{"width": "1%s", "height": 480, "fx": 1, "fy": 1, "cx": 1, "cy": 1}' % ("0" * 2000),
+        "image size inf x 480 is not in whole pixels$",
+    ),
     # ROS publishes a zero matrix for a camera nobody calibrated.
     "zero.yaml": ("{width: 640, height: 480, k: [0, 0, 0, 0, 0, 0, 0, 0, 0]}", "calibrated"),
 }
@@ -136,6 +143,12 @@ def test_another_image_size_is_refused_with_both_sizes() -> None:
 def test_every_form_gives_the_same_camera(tmp_path: Path, name: str) -> None:
     (tmp_path / name).write_text(FILES[name], encoding="utf-8")
     assert read_intrinsics(tmp_path / name) == CAMERA
+
+
+def test_of_a_long_recorded_topic_the_beginning_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "echo.yaml"
+    path.write_text(FILES["echo2.yml"] * 500, encoding="utf-8")
+    assert read_intrinsics(path) == CAMERA
 
 
 @pytest.mark.parametrize("name", BAD_FILES)

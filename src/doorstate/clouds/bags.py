@@ -8,12 +8,19 @@ in it can keep its clouds from being read.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from doorstate.clouds.bag_limits import (
+    check_metadata,
+    keep_packed,
+    limit_unpacking,
+    limited_sqlite,
+    unpack_zstd,
+)
 from doorstate.clouds.camera import Intrinsics
 from doorstate.clouds.depth_messages import check_compressed_format, check_encoding
 from doorstate.clouds.io import DEFAULT_OPTIONS, ReadOptions
@@ -70,14 +77,19 @@ def open_bag(path: Path) -> Iterator[Bag]:
     if path.is_file() and path.suffix not in (".bag", ".db3", ".mcap"):
         raise CloudReadError(f"{path.name}: no bag: give a .bag, .db3 or .mcap file, or a ROS 2 bag folder")
     is_ros1 = path.is_file() and path.suffix == ".bag"
-    with _one_line(path, "damaged, or no bag"):
-        reader = Reader1(path) if is_ros1 else Reader2(path)
-        reader.open()
-    try:
-        types = get_typestore(Stores.ROS1_NOETIC if is_ros1 else Stores.LATEST)
-        yield Bag(path, reader, types.deserialize_ros1 if is_ros1 else types.deserialize_cdr)
-    finally:
-        reader.close()
+    types = get_typestore(Stores.ROS1_NOETIC if is_ros1 else Stores.LATEST)
+    limit_unpacking()
+    with ExitStack() as stack:
+        with _one_line(path, "damaged, or no bag"), limited_sqlite():
+            if path.is_dir():
+                check_metadata(path)
+            reader = Reader1(path) if is_ros1 else Reader2(path)
+            reader.open()
+            stack.callback(reader.close)
+            if not is_ros1:
+                keep_packed(reader)
+            bag = Bag(path, reader, types.deserialize_ros1 if is_ros1 else types.deserialize_cdr)
+        yield bag
 
 
 class Bag:
@@ -87,15 +99,18 @@ class Bag:
         self._path = path
         self._reader = reader
         self._deserialize = deserialize
+        found: dict[str, BagTopic] = {}
+        for connection in reader.connections:
+            name, message_type = connection.topic, connection.msgtype
+            if isinstance(name, str) and isinstance(message_type, str):  # SQLite and YAML hold what they like
+                known = found.get(name, BagTopic(name, message_type, 0))
+                found[name] = known._replace(messages=known.messages + int(connection.msgcount))
+        self._topics = [found[name] for name in sorted(found)]
 
     @property
     def topics(self) -> list[BagTopic]:
         """Every topic, sorted by name."""
-        found: dict[str, BagTopic] = {}
-        for connection in self._reader.connections:
-            known = found.get(connection.topic, BagTopic(connection.topic, connection.msgtype, 0))
-            found[connection.topic] = known._replace(messages=known.messages + connection.msgcount)
-        return [found[name] for name in sorted(found)]
+        return self._topics
 
     def choose(self, name: str | None = None) -> BagTopic:
         """The topic of this name, or the only one that can be read.
@@ -170,7 +185,7 @@ class Bag:
         connections = [connection for connection in self._reader.connections if connection.topic == name]
         with _one_line(self._path, "damaged from here on"):
             for _, log_ns, raw in self._reader.messages(connections):
-                yield log_ns, raw
+                yield int(log_ns), raw
 
     def _first(self, topic: BagTopic) -> Any:
         _, raw = next(self._raw_messages(topic.name), (0, b""))
@@ -178,9 +193,7 @@ class Bag:
             return self._message(raw, topic.type)
 
     def _message(self, raw: bytes, message_type: str) -> Any:
-        if raw[:4] == _ZSTD:
-            raise CloudReadError("is compressed: give the folder of the bag, not one file of it")
-        return self._deserialize(raw, message_type)
+        return self._deserialize(unpack_zstd(raw) if raw[:4] == _ZSTD else raw, message_type)
 
     def _stamped(
         self, log_ns: int, raw: bytes, message_type: str, convert: Callable[[Any], Points]

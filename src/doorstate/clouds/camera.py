@@ -9,9 +9,10 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, NamedTuple, Self
 
-import yaml
-
+from doorstate.clouds.plain_yaml import plain_documents
 from doorstate.errors import CameraError, one_line
+
+_MAX_BYTES = 1 << 15  # of a camera file: reading YAML takes seconds a megabyte
 
 
 @dataclass(frozen=True)
@@ -81,9 +82,9 @@ def read_intrinsics(path: Path) -> Intrinsics:
         CameraError: when the file cannot be read, lacks a number, or holds impossible ones.
     """
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = _beginning(path).decode("utf-8-sig")
         # A recorded topic (`rostopic echo`) is a stream of documents: take the first that holds anything.
-        documents = [json.loads(text)] if path.suffix.lower() == ".json" else yaml.safe_load_all(text)
+        documents = [json.loads(text)] if path.suffix.lower() == ".json" else plain_documents(text)
         return _from_mapping(next((document for document in documents if document is not None), None))
     except CameraError as error:
         raise CameraError(f"{path.name}: {error}") from error
@@ -93,6 +94,18 @@ def read_intrinsics(path: Path) -> Intrinsics:
         raise CameraError(
             f"{path.name}: not a JSON or YAML file with intrinsics ({one_line(error)})"
         ) from error
+
+
+def _beginning(path: Path) -> bytes:
+    """All of a file, or those of its documents that end within `_MAX_BYTES`."""
+    with path.open("rb") as stream:
+        content = stream.read(_MAX_BYTES + 1)
+    if len(content) <= _MAX_BYTES:
+        return content
+    documents, separator, _ = content.rpartition(b"\n---")
+    if not separator:
+        raise CameraError(f"is larger than {_MAX_BYTES >> 10} KiB, so no camera")
+    return documents
 
 
 def _from_mapping(entries: Any) -> Intrinsics:
@@ -117,5 +130,5 @@ def _from_mapping(entries: Any) -> Intrinsics:
         )
     numbers = {name: float(values[name]) for name in names}
     if not (numbers["width"].is_integer() and numbers["height"].is_integer()):
-        raise CameraError(f"image size {values['width']} x {values['height']} is not in whole pixels")
+        raise CameraError(f"image size {numbers['width']:g} x {numbers['height']:g} is not in whole pixels")
     return Intrinsics(int(numbers.pop("width")), int(numbers.pop("height")), **numbers)
