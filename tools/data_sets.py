@@ -29,7 +29,7 @@ SIMULATED = {
         )
     },
     "test-angles": "--preset varied-angles --scenes 200 --seed 22 --sensor xtion",
-    "test-cluttered": "--preset cluttered --scenes 200 --seed 23 --sensor xtion",
+    "test-cluttered": "--preset cluttered --scenes 600 --seed 23 --sensor xtion",
 }
 JOINED = {
     "mixture": (

@@ -23,7 +23,7 @@ from doorstate_command import REPOSITORY, doorstate
 from published import publish, rows_of
 
 RESULTS, RUNS, EXPERIMENTS = REPOSITORY / "results", REPOSITORY / "runs", REPOSITORY / "experiments"
-PAGES = (Path("docs") / "results.md", Path("docs") / "related.md")
+PAGES = tuple(Path("docs") / name for name in ("results.md", "related.md", "worlds.md"))
 STUDIES = {"transfer": "tested", "resolution": "points"}  # commands, and what only their files say
 BESIDE = {"related": "paper"}  # is shown beside the methods of another comparison
 
@@ -101,6 +101,7 @@ def again(network: str, fold: int, name: str = "paper") -> str | None:
 def build(root: Path) -> None:
     """Write everything that follows from the committed predictions below `root`."""
     from results_page import write_pages
+    from worlds_page import write_worlds_page
 
     from doorstate.evaluation.resolution import write_resolution
     from doorstate.evaluation.transfer import load_transfer_results, write_transfer
@@ -118,7 +119,9 @@ def build(root: Path) -> None:
         if study.is_file() and "tested" in (asked := tomllib.loads(study.read_text(encoding="utf-8"))):
             found = load_transfer_results(folder, tuple(asked["trained"]), tuple(asked["tested"]), RESULTS)
             write_transfer(found, root / "results" / folder.name / "report")
-    write_pages(RESULTS, root / "results", *(root / page for page in PAGES))
+    results_page, related_page, worlds_page = (root / page for page in PAGES)
+    write_pages(RESULTS, root / "results", results_page, related_page)
+    write_worlds_page(RESULTS, root / "results", worlds_page)
 
 
 def check() -> str | None:

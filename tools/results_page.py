@@ -116,7 +116,7 @@ def write_pages(results_folder: Path, reports_folder: Path, results_page: Path, 
         folder.name: _published([folder], reports_folder) for folder in folders if whole_folds(folder)
     }
     resolution = results_folder / "resolution"
-    _render(
+    render(
         "results.md.j2",
         results_page,
         published=published,
@@ -133,7 +133,7 @@ def write_pages(results_folder: Path, reports_folder: Path, results_page: Path, 
     )
     if "paper" in published and "related" in published:
         both = [results_folder / name for name in ("paper", "related")]
-        _render("related.md.j2", related_page, all=_published(both, reports_folder))
+        render("related.md.j2", related_page, all=_published(both, reports_folder))
 
 
 def _both(
@@ -145,7 +145,7 @@ def _both(
     return _table(make(published["paper"], published[name]))
 
 
-def _render(name: str, page: Path, **content: Any) -> None:
+def render(name: str, page: Path, **content: Any) -> None:
     text = template(name).render(
         **content,
         names=NAMES,

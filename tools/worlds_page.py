@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: Apache-2.0
+"""docs/worlds.md, what the mixture's weights reach and how far they carry: words are in the .j2, figures computed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from published import rows_of
+from results_page import NAMES, render, whole_folds
+
+from doorstate.dataset.store import PreparedDataset, open_dataset
+from doorstate.evaluation.calibration import calibrate, reliability
+from doorstate.evaluation.head_tables import answer_errors
+from doorstate.evaluation.metrics import confusion_matrix, scores
+from doorstate.evaluation.results import ComparisonResults, load_results
+from doorstate.evaluation.stratum_tables import rows_of as manifest_of
+from doorstate.evaluation.table import Table, number
+
+STUDIES = ("transfer", "augmentation")  # shown below, once they are published
+
+
+class Target(NamedTuple):
+    """Something that was asked for, and how well a network does at it."""
+
+    words: str
+    bound: float
+    more_is_better: bool
+    digits: int
+    found: Callable[[ComparisonResults, PreparedDataset, str], float]
+    where: str = "mixture"  # published comparison that tells
+
+    def reached(self, value: float) -> bool:
+        """Whether a figure is good enough; one that nobody knows is not."""
+        return bool(value >= self.bound if self.more_is_better else value <= self.bound)
+
+
+def _noisy_macro_f1(results: ComparisonResults, dataset: PreparedDataset, network: str) -> float:
+    pooled = results.pooled(network)
+    rows = manifest_of(dataset, pooled)
+    chosen = np.array([row["sensor"] == "xtion" and row["pose_id"].startswith("varied-") for row in rows])
+    return float(scores(confusion_matrix(pooled.true[chosen], pooled.predicted[chosen])).macro.f1)
+
+
+def _points_lost(results: ComparisonResults, dataset: PreparedDataset, network: str) -> float:
+    """By clutter that hides up to a quarter of a door, against none of it, in points of accuracy."""
+    pooled = results.pooled(network)
+    rows = manifest_of(dataset, pooled)
+    bins = np.array([row["occluded_bin"] for row in rows])
+    free, hidden = (pooled.right[bins == name] for name in ("0", "0-25"))
+    return 100 * float(free.mean() - hidden.mean())
+
+
+def _calibration_error(results: ComparisonResults, dataset: PreparedDataset, network: str) -> float:
+    found = calibrate(results, network)
+    return float("nan") if found is None else 100 * reliability(found.true, found.scaled).error
+
+
+def _head(name: str, factor: float = 1.0) -> Callable[[ComparisonResults, PreparedDataset, str], float]:
+    def found(results: ComparisonResults, dataset: PreparedDataset, network: str) -> float:
+        given = results.answers(network)
+        return float("nan") if given is None else factor * answer_errors(given, dataset)[name]
+
+    return found
+
+
+TARGETS = (
+    Target("macro F1 of three states, `varied` as an Xtion sees it", 0.97, True, 4, _noisy_macro_f1),
+    Target("AUROC of *there is a door*", 0.99, True, 4, _head("door, AUROC")),
+    Target("expected calibration error, %", 3, False, 1, _calibration_error),
+    Target(
+        "opening angle of semi-open doors, mean error, °",
+        5,
+        False,
+        1,
+        _head("opening angle, semi-open: mean error, °"),
+    ),
+    Target("hinge side, % right", 98, True, 1, _head("hinge side", 100)),
+    Target("frame position, median error, cm", 8, False, 1, _head("frame position: median error, m", 100)),
+    Target("frame yaw, median error, °", 4, False, 1, _head("yaw: median error, °")),
+    Target(
+        "points of accuracy lost where up to a quarter of the door is hidden",
+        3,
+        False,
+        1,
+        _points_lost,
+        "transfer/mixture/cluttered",
+    ),
+)
+
+
+def write_worlds_page(results_folder: Path, reports_folder: Path, page: Path) -> None:
+    """Render the page once the mixture is published.
+
+    Args:
+        results_folder: holds a folder for each published experiment and each data set, rows alone.
+        reports_folder: holds `<experiment>/report` of each, made before.
+        page: where to.
+    """
+    mixture = results_folder / "mixture"
+    if not mixture.is_dir() or not whole_folds(mixture):
+        return
+    results = load_results(mixture, rows_of(mixture, results_folder))
+    tables = {
+        name: {
+            path.stem: path.read_text(encoding="utf-8").strip()
+            for path in (reports_folder / name / "report" / "tables").glob("*.md")
+        }
+        for name in ("mixture", *STUDIES)
+    }
+    render(
+        "worlds.md.j2",
+        page,
+        results=results,
+        targets=targets_table(results_folder, results.networks).to_markdown().strip(),
+        tables=tables,
+        trained={run.network: int(run.metric("train_samples")) for run in results.runs},
+    )
+
+
+def targets_table(results_folder: Path, networks: Sequence[str]) -> Table:
+    """What was asked for, and what every network reaches; what is not published yet nobody knows."""
+    rows = []
+    for target in TARGETS:
+        comparison = results_folder / target.where
+        found = dict.fromkeys(networks, float("nan"))
+        if comparison.is_dir():
+            folder = rows_of(comparison, results_folder)
+            results, dataset = load_results(comparison, folder), open_dataset(folder)
+            found |= {network: target.found(results, dataset, network) for network in results.networks}
+        good = [NAMES[network] for network in networks if target.reached(found[network])]
+        rows.append(
+            (
+                target.words,
+                f"{'≥' if target.more_is_better else '≤'} {target.bound:g}",
+                *(number(found[network], target.digits) for network in networks),
+                "all" if len(good) == len(networks) else ", ".join(good) or "none",
+            )
+        )
+    columns = ("", "asked for", *(NAMES[network] for network in networks), "reached by")
+    return Table("What was asked for, and what is reached", columns, tuple(rows))
