@@ -14,6 +14,7 @@ from sklearn.metrics import log_loss
 from doorstate.dataset.store import PreparedDataset
 from doorstate.evaluation.calibration import (
     BINS,
+    FEWEST,
     calibrate,
     calibration_table,
     reliability,
@@ -83,3 +84,8 @@ def test_the_figure_needs_validation_answers(
     figure = reliability_figure(results)
     assert figure is not None
     assert [axis.get_title() for axis in figure.axes if axis.get_title()] == ["pointnet"]
+    pooled = results.pooled("pointnet")
+    few = reliability(pooled.true, pooled.probabilities).counts < FEWEST
+    _, joined, hollow, *_ = figure.axes[0].lines
+    assert np.isnan(np.asarray(joined.get_ydata())[few]).all()
+    assert np.isnan(np.asarray(hollow.get_ydata())[~few]).all()

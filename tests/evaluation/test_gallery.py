@@ -33,6 +33,11 @@ def test_cards_of_a_simulated_comparison(
         ["dgcnn"],
         ["pointnet", "dgcnn"],
     ]
+    assert [(heading, [card.sample_id for card in cards]) for heading, cards in gallery.groups] == [
+        ("Missed by 2 of 2", [both]),
+        ("Missed by 1 of 2", [one]),
+        ("Undecidable", [twin]),
+    ]
     assert gallery.left_out == {"pointnet": 0, "dgcnn": 0}
     first = gallery.cards[0]
     assert first.picture is not None

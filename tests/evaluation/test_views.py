@@ -22,8 +22,8 @@ AXES = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], dtype=np.fl
 def test_the_view_is_a_rotation_seen_from_behind_and_above() -> None:
     screen, _ = oblique_view(AXES)
     ahead, left, up = screen
-    assert left[0] < 0  # the robot's left is left on the page
-    assert abs(up[0]) < 1e-12  # uprights stay upright
+    np.testing.assert_allclose(left, [-1, 0])  # the robot's left is left on the page, and level
+    assert up[0] == ahead[0] == 0  # uprights stay upright, and straight ahead leads upwards
     assert up[1] > 0
     assert ahead[1] > 0  # farther floor lies higher on the page: the eye is above
     # Two rows of an orthonormal matrix: what the view shows of the three axes has unit length in each direction.

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import groupby
 
 import matplotlib as mpl
 import numpy as np
@@ -17,7 +18,7 @@ from doorstate.dataset.labelled import LabelledFrame
 from doorstate.deployment.asking import Asked, Methods
 from doorstate.deployment.sightings import Sighting
 from doorstate.deployment.view import CHANNEL_PARTS, Entry, look
-from doorstate.evaluation.gallery import picture_uri
+from doorstate.evaluation.gallery import missed_by, picture_uri
 from doorstate.evaluation.pages import render_page
 from doorstate.evaluation.table import Table
 from doorstate.evaluation.views import SHAPE_COLORS, STATE_COLORS
@@ -123,7 +124,8 @@ def render_frame_page(
         version=__version__,
         tables=tables,
         notes=notes,
-        cards=cards,
+        groups=_groups(cards, len(asked.predictions)),
+        shown=len(cards),
         left_out=sum(bool(asked.wrong(number)) for number in range(len(asked.frames)))
         - sum(bool(card.wrong) for card in cards),
         total=len(asked.frames),
@@ -137,6 +139,12 @@ def render_frame_page(
             "channel_parts": CHANNEL_PARTS,
         },
     )
+
+
+def _groups(cards: Sequence[FrameCard], methods: int) -> list[tuple[str, list[FrameCard]]]:
+    """Cards of `choose_frames` under headings."""
+    by_missed = groupby(cards, lambda card: len(card.wrong))
+    return [(missed_by(missed, methods), list(some)) for missed, some in by_missed]
 
 
 def _drawn(view: Entry) -> Entry:

@@ -14,9 +14,10 @@ from doorstate.evaluation.results import ComparisonResults
 from doorstate.evaluation.table import Table, mean_deviation, number
 from doorstate.evaluation.views import graph_axes
 from doorstate.training.calibration import at_temperature, fit_temperature
-from doorstate.types import Indices
+from doorstate.types import STATES, Indices
 
 BINS = 15
+FEWEST = 10  # answers of a bin that means something
 _RAW, _SCALED, _INK = "#D55E00", "#0072B2", "#333333"
 
 
@@ -118,7 +119,10 @@ def reliability_figure(results: ComparisonResults) -> Figure | None:
             (calibrated.scaled, _SCALED, 0.25),
         ):
             bins = reliability(calibrated.true, probabilities)
-            upper.plot(bins.confidence, bins.accuracy, "o-", color=color, markersize=3.5, linewidth=1.0)
+            few = bins.counts < FEWEST
+            sure, unsure = np.where(few, np.nan, bins.accuracy), np.where(few, bins.accuracy, np.nan)
+            upper.plot(bins.confidence, sure, "o-", color=color, markersize=3.5, linewidth=1.0)
+            upper.plot(bins.confidence, unsure, "o", color=color, markersize=3.5, fillstyle="none", alpha=0.5)
             centres = (np.arange(BINS) + 0.5 + shift) / BINS
             lower.bar(centres, bins.counts, width=0.5 / BINS, color=color, linewidth=0)
             upper.text(
@@ -130,16 +134,19 @@ def reliability_figure(results: ComparisonResults) -> Figure | None:
                 ha="right",
                 transform=upper.transAxes,
             )
-        upper.set(title=network, xlim=(0, 1.02), ylim=(-0.02, 1.05), aspect="auto")
+        upper.set(title=network, xlim=(1 / len(STATES), 1.01), ylim=(-0.02, 1.05))
         lower.set(xlabel="probability of the answer", yscale="log")
+        lower.yaxis.set_major_formatter("{x:g}")
         for axis in (upper, lower):
             graph_axes(axis)
     grid[0, 0].set_ylabel("share of right answers")
     grid[1, 0].set_ylabel("answers")
-    handles = [Line2D([], [], color=color, marker="o", markersize=4) for color in (_RAW, _SCALED)]
-    figure.legend(
-        handles, ["as trained", "temperature scaled"], loc="outside upper right", ncols=2, frameon=False
-    )
+    handles = [
+        *(Line2D([], [], color=color, marker="o", markersize=4) for color in (_RAW, _SCALED)),
+        Line2D([], [], color=_INK, marker="o", linestyle="", markersize=4, fillstyle="none", alpha=0.5),
+    ]
+    labels = ["as trained", "temperature scaled", f"fewer than {FEWEST} answers"]
+    figure.legend(handles, labels, loc="outside upper right", ncols=3, frameon=False)
     return figure
 
 

@@ -13,12 +13,10 @@ from doorstate.dataset.store import PreparedDataset
 from doorstate.evaluation.found_shapes import draw_shapes
 from doorstate.evaluation.gallery import order_of_errors
 from doorstate.evaluation.results import ComparisonResults, ErrorRow
-from doorstate.evaluation.samples_figure import draw_cloud
-from doorstate.evaluation.views import picture_axes
-from doorstate.types import NO_ANSWER
+from doorstate.evaluation.samples_figure import draw_cloud, part_legend
+from doorstate.evaluation.views import STATE_WORDS, picture_axes
 
 _COLUMNS = 5
-_SHORT = {"closed": "closed", "semi_open": "semi-open", "open": "open", NO_ANSWER: "no answer"}
 
 
 def surest_errors_figure(results: ComparisonResults, dataset: PreparedDataset) -> Figure | None:
@@ -33,9 +31,10 @@ def surest_errors_figure(results: ComparisonResults, dataset: PreparedDataset) -
     for line, (network, errors) in enumerate(lines):
         axes[2 * line][0].set_ylabel(f"{network}\n{len(by_network[network])} errors", fontsize=10)
         for column, error in enumerate(errors):
-            title = f"{_SHORT[error.state]} as {_SHORT[error.predicted]}, {error.confidence:.2f}"
+            title = f"{STATE_WORDS[error.state]} as {STATE_WORDS[error.predicted]}, {error.confidence:.2f}"
             _draw(axes[2 * line][column], axes[2 * line + 1][column], dataset, error, title)
             draw_shapes(axes[2 * line + 1][column], results.shapes(network, error.sample_id))
+    part_legend(figure, dataset, [dataset.index_of(e.sample_id) for _, errors in lines for e in errors])
     return figure
 
 
@@ -51,9 +50,10 @@ def common_errors_figure(results: ComparisonResults, dataset: PreparedDataset) -
     figure, axes = _grid(-(-len(shown) // _COLUMNS))
     for place, errors in enumerate(shown):
         line, column = divmod(place, _COLUMNS)
-        said = sorted({_SHORT[error.predicted] for error in errors})
-        title = f"{_SHORT[errors[0].state]} as {' or '.join(said)}\nby {', '.join(e.network for e in errors)}"
+        said = sorted({STATE_WORDS[error.predicted] for error in errors})
+        title = f"{STATE_WORDS[errors[0].state]} as {' or '.join(said)}\nby {', '.join(e.network for e in errors)}"
         _draw(axes[2 * line][column], axes[2 * line + 1][column], dataset, errors[0], title)
+    part_legend(figure, dataset, [dataset.index_of(errors[0].sample_id) for errors in shown])
     return figure
 
 

@@ -15,7 +15,7 @@ from doorstate.evaluation.metrics import Floats
 from doorstate.evaluation.results import ComparisonResults
 from doorstate.evaluation.stratum_tables import rows_of
 from doorstate.evaluation.table import Table, number
-from doorstate.evaluation.views import graph_axes
+from doorstate.evaluation.views import NETWORK_COLORS, graph_axes
 from doorstate.types import Indices
 
 _FEWEST = 10  # samples of a bin that is drawn
@@ -158,7 +158,7 @@ def factors_figure(results: ComparisonResults, dataset: PreparedDataset) -> Figu
                 marker="o",
                 markersize=3,
                 linewidth=1.2,
-                color=f"C{order}" if order < 10 else "black",
+                color=NETWORK_COLORS.get(method, f"C{order}" if order < 10 else "black"),
                 label=method,
             )
         axis.set_xlabel(title)

@@ -13,7 +13,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import LogLocator, NullLocator
+from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
 from doorstate.dataset.store import PreparedDataset
 from doorstate.evaluation.calibration import reliability_figure
@@ -24,13 +24,14 @@ from doorstate.evaluation.plan_figures import error_map, poses_figure
 from doorstate.evaluation.results import ComparisonResults, Run
 from doorstate.evaluation.samples_figure import samples_figure
 from doorstate.evaluation.score_tables import answers_given, f1_intervals, fold_f1, pooled_confusion
-from doorstate.evaluation.views import graph_axes
+from doorstate.evaluation.views import STATE_WORDS, graph_axes
 from doorstate.files import atomic_path
 from doorstate.types import STATES
 
 _DPI = 160
 _PICTURE_DPI = 110  # figures full of pictures are megabytes otherwise
 _PICTURES = ("figure2_samples", "figure3_misclassified", "figure4_missed_by_most")
+_LACKING = (0.0, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5)  # ticks
 _TRAINING, _VALIDATION, _INK = "#0072B2", "#D55E00", "#333333"
 
 
@@ -120,8 +121,8 @@ def confusion_figure(results: ComparisonResults) -> Figure:
                 j, i, str(count), ha="center", va="center", color="white" if share[i, j] > 0.5 else "black"
             )
         axis.set(title=network, xlabel="predicted", xticks=range(len(shown)), yticks=range(len(STATES)))
-        axis.set_xticklabels([answer.replace("_a", "\na") for answer in shown], fontsize=8)
-        axis.set_yticklabels(STATES, fontsize=8)
+        axis.set_xticklabels([STATE_WORDS[answer].replace(" ", "\n") for answer in shown], fontsize=8)
+        axis.set_yticklabels([STATE_WORDS[state] for state in STATES], fontsize=8)
     axes[0].set_ylabel("true")
     return figure
 
@@ -153,38 +154,47 @@ def spread_figure(results: ComparisonResults, dataset: PreparedDataset) -> Figur
 
 
 def learning_figure(results: ComparisonResults) -> Figure:
-    """Losses and validation macro-F1 by epoch, a line for each fold, a dot at the epoch that was kept."""
+    """Losses and what macro-F1 lacks of 1 by epoch, a line for each fold, a dot at the epoch that was kept."""
     networks = results.networks
     figure = Figure(figsize=(2.6 * len(networks) + 0.8, 4.4), layout="constrained")
     grid = figure.subplots(2, len(networks), squeeze=False, sharex="col", sharey="row")
     for column, network in enumerate(networks):
-        losses, f1 = grid[0, column], grid[1, column]
+        losses, lacking = grid[:, column]
         for run in results.runs_of(network):
             _draw_log(losses, run, "train_loss", _TRAINING)
             _draw_log(losses, run, "val_loss", _VALIDATION)
-            _draw_log(f1, run, "val_macro_f1", _VALIDATION)
+            _draw_log(lacking, run, "val_macro_f1", _VALIDATION, lacking=True)
         losses.set(title=network, yscale="log")
         losses.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         losses.yaxis.set_major_formatter("{x:g}")
         losses.yaxis.set_minor_locator(NullLocator())
-        f1.set(xlabel="epoch")
-        for axis in (losses, f1):
-            axis.grid(alpha=0.25)
+        # Linear up to 0.01: on a linear axis all good networks look alike, on a logarithmic one 0 has no place.
+        lacking.set(xlabel="epoch")
+        lacking.set_yscale("symlog", linthresh=0.01)
+        lacking.set_yticks(_LACKING, [f"{each:g}" for each in _LACKING])
+        lacking.yaxis.set_minor_locator(NullLocator())
+        lacking.xaxis.set_major_locator(MaxNLocator(6, integer=True))
+        for axis in (losses, lacking):
+            graph_axes(axis)
             if not axis.lines:
                 axis.text(
                     0.5, 0.5, "no log", transform=axis.transAxes, ha="center", va="center", color="gray"
                 )
     grid[0, 0].set_ylabel("loss")
-    grid[1, 0].set_ylabel("validation macro F1")
-    handles = [Line2D([], [], color=color) for color in (_TRAINING, _VALIDATION)]
-    figure.legend(handles, ["training", "validation"], loc="outside upper right", ncols=2, frameon=False)
+    grid[1, 0].set_ylabel("1 − macro F1")
+    handles = [
+        *(Line2D([], [], color=color) for color in (_TRAINING, _VALIDATION)),
+        Line2D([], [], marker="o", linestyle="", markersize=3.5, color=_INK),
+    ]
+    labels = ["training", "validation", "the epoch that was kept"]
+    figure.legend(handles, labels, loc="outside upper right", ncols=3, frameon=False)
     return figure
 
 
-def _draw_log(axis: Axes, run: Run, column: str, color: str) -> None:
+def _draw_log(axis: Axes, run: Run, column: str, color: str, lacking: bool = False) -> None:
     if column not in run.log:
         return
-    epochs, values = run.log["epoch"], run.log[column]
+    epochs, values = run.log["epoch"], 1 - run.log[column] if lacking else run.log[column]
     axis.plot(epochs, values, color=color, alpha=0.7, linewidth=1.0)
     kept = epochs == run.metric("best_epoch")
     axis.plot(epochs[kept], values[kept], "o", color=color, markersize=3.5)

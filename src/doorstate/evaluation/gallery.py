@@ -7,6 +7,7 @@ import io
 from collections import Counter, defaultdict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -44,6 +45,20 @@ class Gallery:
     clouds: Mapping[str, Mapping[str, str | None]]
     shapes: Mapping[str, Mapping[str, list[dict[str, Any]]]]  # by sample and method
     left_out: Mapping[str, int]
+
+    @property
+    def groups(self) -> list[tuple[str, list[Card]]]:
+        """Cards under headings: decidable samples by how many methods missed them, then the others."""
+
+        def heading(card: Card) -> str:
+            return "Undecidable" if card.undecidable else missed_by(len(card.answers), len(self.left_out))
+
+        return [(words, list(cards)) for words, cards in groupby(self.cards, heading)]
+
+
+def missed_by(some: int, methods: int) -> str:
+    """Heading of samples that so many of the methods were wrong about."""
+    return f"Missed by {some or 'none'} of {methods}"
 
 
 def build_gallery(results: ComparisonResults, dataset: PreparedDataset) -> Gallery:

@@ -19,7 +19,7 @@ from doorstate.dataset.strata import REGIONS
 from doorstate.evaluation.metrics import Floats
 from doorstate.evaluation.results import ComparisonResults
 from doorstate.evaluation.stratum_tables import is_undecidable
-from doorstate.evaluation.views import REGION_COLORS, STATE_COLORS
+from doorstate.evaluation.views import REGION_COLORS, STATE_COLORS, STATE_WORDS
 from doorstate.simulation.generate import SampleRow
 from doorstate.simulation.manifest import unflatten
 from doorstate.simulation.scene import Door, build_scene
@@ -41,7 +41,7 @@ def poses_figure(dataset: PreparedDataset) -> Figure | None:
     position = _positions(list(poses.values()))
     heading_rad = np.radians([float(row["heading_deg"]) for row in poses.values()])
     region = np.array([row["region"] for row in poses.values()])
-    figure = Figure(figsize=(9.0, 5.6), layout="constrained")
+    figure = Figure(figsize=(9.0, 5.0), layout="constrained")
     axis = figure.subplots()
     _draw_ground(axis, _door_of(dataset))
     ahead = position + 0.07 * np.stack([np.cos(heading_rad), np.sin(heading_rad)], axis=1)
@@ -72,7 +72,7 @@ def error_map(results: ComparisonResults, dataset: PreparedDataset) -> Figure | 
     networks = results.networks
     columns = min(3, len(networks))
     lines = math.ceil(len(networks) / columns)
-    figure = Figure(figsize=(4.2 * columns, 2.9 * lines + 0.4), layout="constrained")
+    figure = Figure(figsize=(4.2 * columns, 2.4 * lines + 0.4), layout="constrained")
     axes = figure.subplots(lines, columns, squeeze=False).ravel()
     everywhere = np.unique(_positions(_posed_rows(dataset)), axis=0)
     for axis, network in zip(axes, networks, strict=False):
@@ -105,7 +105,7 @@ def error_map(results: ComparisonResults, dataset: PreparedDataset) -> Figure | 
         for state in STATES
     ]
     handles.append(Line2D([], [], linestyle="", marker="o", color="none", markeredgecolor=_INK))
-    labels = [*(f"{state} door" for state in STATES), "hollow: undecidable"]
+    labels = [*(f"{STATE_WORDS[state]} door" for state in STATES), "hollow: undecidable"]
     figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False)
     return figure
 
@@ -162,7 +162,10 @@ def _draw_ground(axis: Axes, door: Door, lettering: bool = True) -> None:
             zorder=2,
         )
     axis.set_aspect("equal")
-    axis.set(xlim=(-4.6, 4.6), ylim=(-1.2, 4.3))
+    if lettering:
+        axis.set(xlim=(-4.6, 4.6), ylim=(-0.4, 4.3))
+    else:
+        axis.set(xlim=(-4.0, 4.0), ylim=(-0.25, 3.6))
 
 
 def _ray(angle_deg: float) -> NDArray[np.float64]:

@@ -27,7 +27,7 @@ from doorstate.evaluation.results import ComparisonResults
 from doorstate.evaluation.score_tables import answers_given, pooled_confusion
 from doorstate.evaluation.table import Table
 from doorstate.evaluation.tables import dataset_tables, save_tables, write_tables
-from doorstate.evaluation.views import SHAPE_COLORS, STATE_COLORS
+from doorstate.evaluation.views import SHAPE_COLORS, STATE_COLORS, STATE_WORDS
 from doorstate.files import write_text
 from doorstate.types import STATES
 
@@ -109,6 +109,7 @@ def render_report(
         figures={name: _image_uri(drawing) for name, drawing in drawings.items()},
         confusions=[(network, _confusion_cells(results, network)) for network in results.networks],
         states=STATES,
+        words=STATE_WORDS,
         answers=answers_given(results),
         state_colors=STATE_COLORS,
         shape_colors=SHAPE_COLORS,

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,7 +14,14 @@ from numpy.typing import NDArray
 from doorstate.dataset.store import PreparedDataset
 from doorstate.dataset.strata import REGIONS
 from doorstate.evaluation.stratum_tables import has_strata, is_undecidable
-from doorstate.evaluation.views import PART_COLORS, REGION_COLORS, oblique_view, picture_axes, point_colors
+from doorstate.evaluation.views import (
+    PART_COLORS,
+    REGION_COLORS,
+    STATE_WORDS,
+    oblique_view,
+    picture_axes,
+    point_colors,
+)
 from doorstate.types import STATES, Part
 
 _MIDDLE_M = 2.25
@@ -35,7 +42,7 @@ def samples_figure(dataset: PreparedDataset) -> Figure:
         picture_axes(axis)
     for s, state in enumerate(STATES):
         first = lines_per_state * s
-        axes[first, 0].set_ylabel(state, fontsize=11)
+        axes[first, 0].set_ylabel(STATE_WORDS[state], fontsize=11)
         for column, index in enumerate(chosen[s]):
             if index is None:
                 empty = axes[first, column]
@@ -65,13 +72,7 @@ def samples_figure(dataset: PreparedDataset) -> Figure:
                 color=REGION_COLORS[region],
                 linewidth=3,
             )
-    seen = {part for index in indices for part in np.unique(_shown_parts(dataset, index)).tolist()}
-    if seen:
-        handles = [
-            Line2D([], [], marker="o", linestyle="", color=PART_COLORS[Part(part)]) for part in sorted(seen)
-        ]
-        names = [Part(part).name.lower() for part in sorted(seen)]
-        figure.legend(handles, names, loc="outside lower center", ncols=len(seen), frameon=False)
+    part_legend(figure, dataset, indices)
     return figure
 
 
@@ -116,3 +117,12 @@ def draw_cloud(axis: Axes, dataset: PreparedDataset, index: int) -> None:
         f"{float(distance):.1f} m away" if distance else "",
     ]
     axis.set_xlabel(", ".join(fact for fact in facts if fact), fontsize=8)
+
+
+def part_legend(figure: Figure, dataset: PreparedDataset, indices: Iterable[int]) -> None:
+    """Say below the figure what the colours of these samples' clouds are; nothing where parts are unknown."""
+    seen = sorted({part for index in indices for part in _shown_parts(dataset, index).tolist()})
+    if seen:
+        handles = [Line2D([], [], marker="o", linestyle="", color=PART_COLORS[Part(part)]) for part in seen]
+        names = [Part(part).name.lower() for part in seen]
+        figure.legend(handles, names, loc="outside lower center", ncols=len(seen), frameon=False)

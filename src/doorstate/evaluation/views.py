@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.colors import Normalize, to_rgba_array
 from numpy.typing import NDArray
 
-from doorstate.types import Part, Points
+from doorstate.types import NO_ANSWER, Part, Points
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -24,6 +24,7 @@ REGION_COLORS = {
     "yellow": "#F0E442",
     "blue": "#0072B2",
 }
+STATE_WORDS = {"closed": "closed", "semi_open": "semi-open", "open": "open", NO_ANSWER: "no answer"}
 STATE_COLORS = {"closed": "#0072B2", "semi_open": "#E69F00", "open": "#CC79A7"}
 NETWORK_COLORS = {
     "pointnet": "#0072B2",
@@ -51,8 +52,8 @@ PART_COLORS = {
     Part.NONE: "#333333",
 }
 
-VIEW_AZIMUTH_RAD = math.radians(-24.0)  # the eye stands to the left of the robot ...
-VIEW_ELEVATION_RAD = math.radians(28.0)  # ... and above it
+# The eye is right behind the camera, so that left and right are as in its picture, and above it.
+VIEW_ELEVATION_RAD = math.radians(25.0)
 
 
 def oblique_view(points: Points) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
@@ -64,17 +65,10 @@ def oblique_view(points: Points) -> tuple[NDArray[np.float64], NDArray[np.int64]
     Returns:
         (N, 2) metres to the right and up, and the (N,) order in which near points are drawn last.
     """
-    azimuth, elevation = VIEW_AZIMUTH_RAD, VIEW_ELEVATION_RAD
-    forward = np.array(
-        [
-            math.cos(elevation) * math.cos(azimuth),
-            math.cos(elevation) * math.sin(azimuth),
-            -math.sin(elevation),
-        ]
-    )
-    right = np.array([math.sin(azimuth), -math.cos(azimuth), 0.0])
-    screen = points.astype(np.float64) @ np.stack([right, np.cross(right, forward)], axis=1)  # (N, 2)
-    return screen, np.argsort(-(points @ forward), kind="stable")
+    down, level = math.sin(VIEW_ELEVATION_RAD), math.cos(VIEW_ELEVATION_RAD)
+    x, y, z = points.astype(np.float64).T
+    screen = np.stack([-y, down * x + level * z], axis=1)
+    return screen, np.argsort(down * z - level * x, kind="stable")
 
 
 def point_colors(points: Points, parts: NDArray[np.uint8] | None) -> NDArray[np.float64]:

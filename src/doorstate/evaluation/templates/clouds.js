@@ -4,6 +4,7 @@ const clouds = (() => {
   const data = JSON.parse(document.getElementById("page-data").textContent);
   const part = Object.fromEntries(data.parts.map((p) => [p.value, p]));
   const bytes = (text) => Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
+  const EYE = 1.55; // how far from the middle; near enough that the cloud fills the picture
   const MUTED = "rgba(128,128,128,.45)";
   const HEAT = [[0, "#9aa3ae"], [0.3, "#f2b632"], [0.65, "#ee6a1f"], [1, "#d3114f"]];
   const pick = (values, members) => members.map((i) => values[i]);
@@ -55,9 +56,12 @@ const clouds = (() => {
     return [points(cloud, passed, "passed over", { size: 1.5, color: MUTED }), looked];
   }
 
+  // One metre ahead, to the left and up from it: the scale of the picture, in the colours that ROS gives these axes.
   const camera = () => ({
-    type: "scatter3d", mode: "markers", name: "camera", hovertemplate: "camera",
-    x: [0], y: [0], z: [0], marker: { size: 5, symbol: "diamond", color: "#d62728" },
+    type: "scatter3d", mode: "lines+text", name: "camera", showlegend: false, hovertemplate: "camera",
+    x: [0, 1, null, 0, 0, null, 0, 0], y: [0, 0, null, 0, 1, null, 0, 0], z: [0, 0, null, 0, 0, null, 0, 1],
+    text: ["camera", "", "", "", "1 m"], textposition: "bottom center",
+    line: { width: 5, color: ["#d62728", "#d62728", 0, "#2ca02c", "#2ca02c", 0, "#1f77b4", "#1f77b4"] },
   });
 
   function shape({ name, points }, title) {
@@ -72,14 +76,13 @@ const clouds = (() => {
   // What does not change from cloud to cloud, in the colours of the page: from behind and above the camera, as Figure 2.
   function layout() {
     const ink = getComputedStyle(document.body).color;
-    const axis = (title) => ({ title: { text: title }, color: ink, gridcolor: "rgba(128,128,128,.3)", backgroundcolor: "rgba(0,0,0,0)" });
-    const { azimuth: a, elevation: e } = data.view;
-    const eye = { x: -2 * Math.cos(e) * Math.cos(a), y: -2 * Math.cos(e) * Math.sin(a), z: 2 * Math.sin(e) };
+    const hidden = { visible: false };
+    const eye = { x: -EYE * Math.cos(data.elevation), y: 0, z: EYE * Math.sin(data.elevation) };
     return {
       margin: { l: 0, r: 0, t: 0, b: 0 }, paper_bgcolor: "rgba(0,0,0,0)", font: { color: ink },
       modebar: { bgcolor: "rgba(0,0,0,0)", color: ink },
       legend: { orientation: "h", itemsizing: "constant", y: 0.02 },
-      scene: { aspectmode: "data", camera: { eye }, xaxis: axis("forward (m)"), yaxis: axis("left (m)"), zaxis: axis("up (m)") },
+      scene: { aspectmode: "data", camera: { eye }, xaxis: hidden, yaxis: hidden, zaxis: hidden },
     };
   }
 
@@ -106,10 +109,8 @@ const clouds = (() => {
 
   // The same oblique view as Figure 2: from behind and above the camera, near points last.
   function preview(canvas, cloud, colors, shapes) {
-    const { azimuth: a, elevation: e } = data.view;
-    const forward = [Math.cos(e) * Math.cos(a), Math.cos(e) * Math.sin(a), -Math.sin(e)];
-    const right = [Math.sin(a), -Math.cos(a), 0];
-    const up = [Math.sin(e) * Math.cos(a), Math.sin(e) * Math.sin(a), Math.cos(e)];
+    const [down, level] = [Math.sin(data.elevation), Math.cos(data.elevation)];
+    const [forward, right, up] = [[level, 0, -down], [0, -1, 0], [down, 0, level]];
     const along = (d) => Float32Array.from(cloud.x, (x, i) => x * d[0] + cloud.y[i] * d[1] + cloud.z[i] * d[2]);
     const [u, v, depth] = [along(right), along(up), along(forward)];
     const scale = window.devicePixelRatio || 1;
