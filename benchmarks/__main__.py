@@ -284,7 +284,8 @@ def fuzz(
       python -m benchmarks fuzz --out reports/fuzz
       python -m benchmarks fuzz --seconds 600 --first 1000000 --workers 2 --out reports/fuzz
     """
-    from benchmarks.fuzz import FAILURES, fuzz_table, measure
+    from benchmarks.fuzz import fuzz_table, measure
+    from benchmarks.fuzzer import FAILURES
     from doorstate.console import progress_bar
 
     with progress_bar("fuzz") as progress:

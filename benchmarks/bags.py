@@ -114,14 +114,28 @@ def write_bag(folder: Path, kind: str, messages: Sequence[Message], compression:
     with writer:
         connections: dict[str, Any] = {}
         for message in messages:
-            package = "std_msgs" if message.type == "String" else "sensor_msgs"
-            full = f"{package}/msg/{message.type}"
             if message.topic not in connections:
+                full = _full_name(message.type)
                 connections[message.topic] = writer.add_connection(message.topic, full, typestore=store)
-            built = _build(store, message, full, is_ros1)
-            serialize = store.serialize_ros1 if is_ros1 else store.serialize_cdr
-            writer.write(connections[message.topic], message.stamp_ns + 1_000_000, serialize(built, full))
+            content = serialized(message, is_ros1)
+            writer.write(connections[message.topic], message.stamp_ns + 1_000_000, content)
     return path
+
+
+def serialized(message: Message, is_ros1: bool = False) -> bytes:
+    """A message as it is in a bag."""
+    store, full = _store(is_ros1), _full_name(message.type)
+    built = _build(store, message, full, is_ros1)
+    return bytes((store.serialize_ros1 if is_ros1 else store.serialize_cdr)(built, full))
+
+
+def deserialized(content: bytes, message_type: str) -> Any:
+    """A message of ROS 2 from its bytes; raises whatever rosbags does."""
+    return _store(False).deserialize_cdr(content, _full_name(message_type))
+
+
+def _full_name(message_type: str) -> str:
+    return f"{'std_msgs' if message_type == 'String' else 'sensor_msgs'}/msg/{message_type}"
 
 
 @cache

@@ -7,14 +7,17 @@ Everything is drawn from the generator that is handed over, so a seed is enough 
 from __future__ import annotations
 
 import io
+import json
 import re
 import struct
 import zipfile
 import zlib
 from collections.abc import Callable, Sequence
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
+import yaml
 from numpy.lib import format as npy_format
 from numpy.typing import NDArray
 from PIL import Image
@@ -24,7 +27,22 @@ from doorstate.types import Points
 
 Edit = tuple[str, int, bytes]  # replace, insert, delete or cut; where; with what
 EDITS = ("replace", "insert", "delete", "cut")
+MESSAGES = ("PointCloud2", "Image", "CompressedImage")
+CAMERA_SUFFIXES = (".json", ".yaml")
 TOKENS = (b"0", b"9", b"-1", b"99999999999", b"nan", b"\n", b" ", b",", b"x", b"#", b"\xff" * 4, b"\0" * 4)
+YAML_TOKENS = (
+    *TOKENS,
+    b"&a ",
+    b"*a",
+    b"<<: ",
+    b"!!python/name:os.system ",
+    b"!!binary ",
+    b": ",
+    b"- ",
+    b"[",
+    b"{",
+    b"'",
+)
 _NUMBERS = (
     b"-1",
     b"0",
@@ -37,7 +55,9 @@ _NUMBERS = (
     b"1e9",
     b"",
 )
-_HEADER_BYTES = 300  # of every type, in which most sizes and types are said
+_HEADER_BYTES = (
+    300  # of every type, in which most sizes and types are said; of archives and bags the last ones
+)
 _TEXT_ROWS = 400
 _TYPES = (*["<f4"] * 9, "<f8", ">f4", "<f2", "<i2", "<u2", "<i8", "<c8", "|u1", "|b1", "<U3", "|O")
 
@@ -96,24 +116,42 @@ def draw_file(rng: np.random.Generator, suffix: str, scene: Points) -> bytes:
         suffix: one of `CLOUD_SUFFIXES`.
         scene: (H, W, 3) organized cloud that a state can be told from.
     """
+    return draw_broken(rng, lambda: _WRITERS[suffix](rng, draw_points(rng, scene)))
+
+
+def draw_camera_file(rng: np.random.Generator, suffix: str, scene: Points) -> bytes:
+    """A file with the camera of a scene as one of `CAMERA_SUFFIXES`, broken as `draw_file` breaks."""
+    return draw_broken(rng, lambda: _camera(rng, suffix, scene), YAML_TOKENS)
+
+
+def draw_broken(
+    rng: np.random.Generator, write: Callable[[], bytes], tokens: Sequence[bytes] = TOKENS
+) -> bytes:
+    """What is written, in one case of five as it is; otherwise with other bytes, or noise in its place."""
     chance = rng.random()
     if chance < 0.05:
         return rng.bytes(int(rng.integers(0, 400)))
-    data = _WRITERS[suffix](rng, draw_points(rng, scene))
+    data = write()
     if chance < 0.25:
         return data
     if chance < 0.5:
         data = _other_number(rng, data)
-    return mutate(data, draw_edits(rng, len(data)))
+    return mutate(data, draw_edits(rng, len(data), tokens))
 
 
-def draw_edits(rng: np.random.Generator, size: int) -> list[Edit]:
-    """One to four edits, half of them in what is the header of most files."""
+def draw_edits(rng: np.random.Generator, size: int, tokens: Sequence[bytes] = TOKENS) -> list[Edit]:
+    """One to four edits, most of them in what is the header or the index of most files."""
     return [
         (
             str(rng.choice(EDITS, p=(0.4, 0.25, 0.25, 0.1))),
-            int(rng.integers(0, _HEADER_BYTES if rng.random() < 0.5 else size + 1)),
-            TOKENS[rng.integers(len(TOKENS))] if rng.random() < 0.7 else rng.bytes(int(rng.integers(1, 5))),
+            int(
+                rng.choice(
+                    [rng.integers(_HEADER_BYTES), -rng.integers(1, _HEADER_BYTES), rng.integers(size + 1)]
+                )
+            ),
+            tokens[int(rng.integers(len(tokens)))]
+            if rng.random() < 0.7
+            else rng.bytes(int(rng.integers(1, 5))),
         )
         for _ in range(rng.integers(1, 5))
     ]
@@ -190,14 +228,52 @@ def _text(rng: np.random.Generator, points: Points) -> bytes:
 
 
 def _png(rng: np.random.Generator, points: Points) -> bytes:
-    image = points if points.ndim == 3 else points.reshape(1, -1, 3)
-    with np.errstate(all="ignore"):
-        depth = (np.nan_to_num(image[..., 0], posinf=0) * 1000).astype(np.uint16)
-    if min(depth.shape) == 0:
-        depth = np.zeros((1, 1), np.uint16)
+    depth = _depth(points, "<u2")
     if rng.random() < 0.1:
         depth = depth.astype(np.uint8)
     return saved(lambda stream: Image.fromarray(depth).save(stream, "PNG"))
+
+
+def draw_depth(rng: np.random.Generator, scene: Points, stored: str) -> NDArray[Any]:
+    """(H, W) depth of points as `draw_points` gives them: metres as floats, or millimetres."""
+    return _depth(draw_points(rng, scene), stored)
+
+
+def _depth(points: Points, stored: str) -> NDArray[Any]:
+    image = points if points.ndim == 3 else points.reshape(1, -1, 3)
+    depth_m = image[..., 0] if image.size else np.zeros((1, 1), np.float32)
+    with np.errstate(all="ignore"):
+        return (
+            depth_m.astype(stored)
+            if "f" in stored
+            else (np.nan_to_num(depth_m, posinf=0) * 1000).astype(stored)
+        )
+
+
+def _camera(rng: np.random.Generator, suffix: str, scene: Points) -> bytes:
+    height, width = scene.shape[:2]
+    fx, fy, cx, cy = (
+        float(rng.choice([width, width / 2, 0.0, 1e-300, 1e300, -1.0, np.nan]))
+        if rng.random() < 0.1
+        else width / 2
+        for _ in range(4)
+    )
+    size = {"width": width, "height": height}
+    matrix = [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0]
+    forms: list[dict[str, Any]] = [
+        size | {"fx": fx, "fy": fy, "cx": cx, "cy": cy},
+        size | {"fx": fx, "fy": fy, "ppx": cx, "ppy": cy, "coeffs": [0, 0, 0, 0, 0]},
+        size | {"distortion_model": "plumb_bob", "K": matrix},
+        size | {"k": [matrix[:3], matrix[3:6], matrix[6:]]},
+        {
+            "image_width": width,
+            "image_height": height,
+            "camera_matrix": {"rows": 3, "cols": 3, "data": matrix},
+        },
+    ]
+    form = forms[rng.integers(len(forms))]
+    text = json.dumps(form) if suffix == ".json" else yaml.safe_dump(form) + str(rng.choice(["", "---\n"]))
+    return text.encode()
 
 
 _WRITERS: dict[str, Callable[[np.random.Generator, Points], bytes]] = {
@@ -215,8 +291,8 @@ class Field(NamedTuple):
     count: int  # type: ignore[assignment] # tuples have a method of that name
 
 
-def draw_cloud_message(rng: np.random.Generator, scene: Points) -> dict[str, Any]:
-    """Arguments of `points_from_pointcloud2`."""
+def draw_cloud_message(rng: np.random.Generator, scene: Points) -> SimpleNamespace:
+    """As sensor_msgs/PointCloud2."""
     points = draw_points(rng, scene)
     height, width = points.shape[:2] if points.ndim == 3 else (1, len(points))
     message: dict[str, Any] = {
@@ -233,16 +309,13 @@ def draw_cloud_message(rng: np.random.Generator, scene: Points) -> dict[str, Any
         name = str(rng.choice(["x", "y", "intensity", "\udcff", ""]))
         odd = Field(name, draw_number(rng), int(rng.choice([7, 8, 2, 0, 255])), int(rng.choice([1, 0, 3])))
         message["fields"][axis] = odd
-    return break_message(rng, message)
+    return _broken_message(rng, message)
 
 
-def draw_image_message(rng: np.random.Generator, scene: Points) -> dict[str, Any]:
-    """Arguments of `pixels_from_image`."""
-    points = draw_points(rng, scene)
-    depth_m = points[..., 0] if points.ndim == 3 else points[:, :1]
+def draw_image_message(rng: np.random.Generator, scene: Points) -> SimpleNamespace:
+    """As sensor_msgs/Image."""
     encoding = str(rng.choice(["16UC1", "mono16", "32FC1", "rgb8", "", "\udcff"]))
-    with np.errstate(all="ignore"):
-        pixels = depth_m.astype("<f4") if encoding == "32FC1" else (depth_m * 1000).astype("<u2")
+    pixels = draw_depth(rng, scene, "<f4" if encoding == "32FC1" else "<u2")
     message = {
         "height": pixels.shape[0],
         "width": pixels.shape[1],
@@ -251,11 +324,11 @@ def draw_image_message(rng: np.random.Generator, scene: Points) -> dict[str, Any
         "step": pixels.shape[1] * pixels.itemsize,
         "data": pixels.tobytes(),
     }
-    return break_message(rng, message)
+    return _broken_message(rng, message)
 
 
-def draw_compressed_message(rng: np.random.Generator, scene: Points) -> dict[str, Any]:
-    """Arguments of `pixels_from_compressed_depth`."""
+def draw_compressed_message(rng: np.random.Generator, scene: Points) -> SimpleNamespace:
+    """As sensor_msgs/CompressedImage."""
     parameters = rng.bytes(12) if rng.random() < 0.5 else np.array([0, 100, 1], "<f4").tobytes()
     encodings = [
         "16UC1; compressedDepth png",
@@ -264,20 +337,20 @@ def draw_compressed_message(rng: np.random.Generator, scene: Points) -> dict[str
         "jpeg",
         "",
     ]
-    return {
-        "image_format": str(rng.choice(encodings, p=(0.5, 0.3, 0.1, 0.05, 0.05))),
-        "data": (parameters + draw_file(rng, ".png", scene))[int(rng.choice([0, 0, 0, 5])) :],
-    }
+    return SimpleNamespace(
+        format=str(rng.choice(encodings, p=(0.5, 0.3, 0.1, 0.05, 0.05))),
+        data=(parameters + draw_file(rng, ".png", scene))[int(rng.choice([0, 0, 0, 5])) :],
+    )
 
 
-def break_message(rng: np.random.Generator, message: dict[str, Any]) -> dict[str, Any]:
-    """The message with up to two numbers exchanged, and its data broken in one case of three."""
+def _broken_message(rng: np.random.Generator, message: dict[str, Any]) -> SimpleNamespace:
+    """A message with up to two numbers exchanged, and its data broken in one case of three."""
     sizes = [name for name, value in message.items() if type(value) is int]
     for name in rng.choice(sizes, int(rng.integers(0, 3)), replace=False):
         message[str(name)] = draw_number(rng)
     if rng.random() < 1 / 3:
         message["data"] = mutate(message["data"], draw_edits(rng, len(message["data"])))
-    return message
+    return SimpleNamespace(**message)
 
 
 def draw_number(rng: np.random.Generator) -> int:

@@ -18,8 +18,10 @@ import numpy as np
 import pytest
 import torch
 from benchmarks import fuzz
-from benchmarks.fuzz import OUTCOMES, TARGETS
+from benchmarks.broken_bags import BAG_SUFFIXES
+from benchmarks.fuzzer import BAG_FOLDER, CAMERA, OUTCOMES, TARGETS, Fuzzer
 from benchmarks.gate import FAULTS
+from benchmarks.mutations import MESSAGES
 
 from doorstate.dataset.store import PreparedDataset
 from doorstate.deployment.predictor import Prediction
@@ -50,6 +52,12 @@ def stored(folder: Path, name: str) -> tuple[dict[str, Any], list[dict[str, Any]
     content = json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))
     rows = [row for group in content["groups"].values() for row in group["rows"]]
     return content["settings"], rows, (folder / f"{name}.md").read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def fuzzer(tmp_path_factory: pytest.TempPathFactory) -> Fuzzer:
+    """Every reader and the service, in this process."""
+    return Fuzzer(tmp_path_factory.mktemp("fuzzer") / "scratch")
 
 
 @pytest.fixture(scope="module")
@@ -327,6 +335,13 @@ def test_bad_input_is_counted_by_what_becomes_of_it(tmp_path: Path) -> None:
     assert "Bad input" in output
 
 
+@pytest.mark.parametrize("target", [*BAG_SUFFIXES, BAG_FOLDER, CAMERA, *MESSAGES])
+def test_some_inputs_of_every_target_are_good(target: str, fuzzer: Fuzzer) -> None:
+    rng = np.random.default_rng(0)
+    outcomes = {fuzzer.judge(target, fuzzer.draw_for(target, rng), rng)[0] for _ in range(60)}
+    assert {"answered", "refused"} <= outcomes <= {"answered", "no state", "refused"}
+
+
 def test_inputs_that_make_something_fail_are_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(fuzz, "Worker", Careless)
     rows = fuzz.measure(0, 40, None, 1, tmp_path, no_progress)
@@ -362,7 +377,7 @@ class Careless:
     [("raise ValueError", "crash"), ("warn", "crash"), ("spin", "hang"), ("answer", "answer without data")],
 )
 def test_the_fuzzer_sees_what_it_looks_for(
-    fault: str, outcome: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    fault: str, outcome: str, fuzzer: Fuzzer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def parse(data: bytes, suffix: str, options: object) -> np.ndarray:
         if fault == "raise ValueError":
@@ -378,9 +393,8 @@ def test_the_fuzzer_sees_what_it_looks_for(
     def careless(points: np.ndarray) -> Prediction:
         return Prediction(DoorState.OPEN, {"open": 1.0}, 0, 0.0)
 
-    fuzzer = fuzz.Fuzzer(tmp_path)
-    monkeypatch.setattr(fuzz, "parse_cloud", parse)
-    monkeypatch.setattr(fuzz, "LIMIT_S", 0.1)
+    monkeypatch.setattr("benchmarks.fuzzer.parse_cloud", parse)
+    monkeypatch.setattr("benchmarks.fuzzer.LIMIT_S", 0.1)
     if fault == "answer":
         monkeypatch.setattr(fuzzer, "_predict", careless)
         monkeypatch.setattr(fuzzer, "_gated", careless)
