@@ -274,7 +274,7 @@ def fuzz(
     first: Annotated[int, typer.Option(help="Number of the first input.", min=0)] = 0,
     workers: Annotated[int, typer.Option(help="Processes.", min=1)] = 1,
 ) -> None:
-    """Broken files, messages and requests through every reader and the service: which are not refused cleanly.
+    """Broken files, bags, messages and requests through every reader and the service: which are not refused cleanly.
 
     An input is made from its number alone; those that make something fail are kept in a folder beside the table,
     and the exit code is 1.

@@ -45,7 +45,7 @@ from doorstate.clouds.preparation import MIN_POINTS, is_measured
 from doorstate.deployment.predictor import Predictor
 from doorstate.deployment.service import create_app
 from doorstate.deployment.workload import Limits
-from doorstate.errors import CameraError, CloudError, DoorstateError
+from doorstate.errors import LONGEST_LINE, CameraError, CloudError, DoorstateError
 from doorstate.types import Points
 
 LIMIT_S = 1.0  # of processor time for one input
@@ -257,7 +257,7 @@ def _of_error(error: DoorstateError) -> Outcome:
 
 def _of_line(line: str) -> Outcome:
     """A refusal is one line that can be printed."""
-    if len(line.splitlines()) != 1 or len(line) > 1000:
+    if len(line.splitlines()) != 1 or len(line) > LONGEST_LINE:
         return "crash", f"no line: {line!r}"
     return "refused", ""
 

@@ -22,7 +22,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from pydantic import ValidationError
 
-_LONGEST_REASON = 160  # letters
+LONGEST_LINE = 1000  # letters: a file may name a million fields
+_LONGEST_REASON = 160
 
 
 class DoorstateError(Exception):
@@ -30,7 +31,8 @@ class DoorstateError(Exception):
 
     def __str__(self) -> str:
         # Files name their parts, and files have names: line breaks and terminal escapes among them.
-        return "".join(letter if letter.isprintable() else " " for letter in super().__str__())
+        line = "".join(letter if letter.isprintable() else " " for letter in super().__str__())
+        return line if len(line) <= LONGEST_LINE else f"{line[: LONGEST_LINE - 3]}..."
 
 
 class CloudError(DoorstateError):

@@ -30,7 +30,7 @@ from doorstate.clouds.io import (
     read_cloud,
 )
 from doorstate.clouds.pcd import write_pcd
-from doorstate.errors import CameraError, CloudError, CloudReadError
+from doorstate.errors import LONGEST_LINE, CameraError, CloudError, CloudReadError
 
 NAN = np.nan
 POINTS = np.array([[1.5, -2.25, 3.125], [NAN, NAN, NAN], [0.5, 0.25, -8.0], [4.0, 1.0, 0.5]], np.float32)
@@ -291,6 +291,20 @@ def test_damaged_files_are_read_or_are_cloud_errors(
             assert outcome.dtype == np.float32
             assert outcome.ndim in (2, 3)
             assert outcome.shape[-1] == 3
+
+
+@pytest.mark.parametrize("shape", [(0, 10**9, 3), (10**9, 0, 3), (0, 4)])
+def test_a_cloud_without_points_has_no_size(shape: tuple[int, ...]) -> None:
+    header = str({"descr": "<f4", "fortran_order": False, "shape": shape}).encode()
+    data = b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") + header
+    assert parse_cloud(data, ".npy", ReadOptions(roll_deg=90)).shape == (0, 3)
+
+
+def test_a_million_names_are_no_line() -> None:
+    header = b"ply\nformat ascii 1.0\nelement vertex 1\n" + b"property float w\n" * 10_000 + b"end_header\n"
+    with pytest.raises(CloudReadError, match=r"has vertices of w, w, .*\.\.\.$") as caught:
+        parse_cloud(header, ".ply")
+    assert len(str(caught.value)) == LONGEST_LINE
 
 
 @pytest.mark.parametrize("suffix", [".npz", ".png", ".pcd"])

@@ -44,6 +44,14 @@ def test_eight_bits_are_not_depth() -> None:
         parse_depth_png(_png(Image.new("L", (20, 20))))
 
 
+@pytest.mark.parametrize("mode", ["L", "RGB"])
+def test_a_second_header_is_not_believed(mode: str) -> None:
+    header_end = 33
+    deep, other = _png(Image.fromarray(np.ones((20, 20), np.uint16))), _png(Image.new(mode, (20, 20)))
+    with pytest.raises(CloudReadError, match="two headers"):
+        parse_depth_png(deep[:header_end] + other[8:])
+
+
 def test_a_huge_declared_size_is_refused_before_decoding() -> None:
     data = bytearray(_png(Image.fromarray(np.ones((20, 20), np.uint16))))
     data[16:24] = struct.pack(">II", 30000, 30000)

@@ -244,6 +244,8 @@ def points_from_depth(stored: NDArray[Any], options: ReadOptions) -> Points:
 def _points_from_rows(stored: NDArray[Any], options: ReadOptions) -> Points:
     if stored.ndim not in (2, 3) or not 3 <= stored.shape[-1] <= _MAX_POINT_VALUES:
         raise CloudReadError(f"holds shape {stored.shape}: expected (N, 3), (H, W, 3) or depth (H, W)")
+    if stored.size == 0:  # a side of a billion pixels beside one of none is no size to work with
+        return np.empty((0, 3), np.float32)
     return points_in_body(stored[..., :3], options)
 
 

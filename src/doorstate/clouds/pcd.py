@@ -30,6 +30,8 @@ _DATA_LINE = re.compile(rb"^DATA[ \t]+(ascii|binary|binary_compressed)[ \t]*(?:\
 _COMPRESSED_SIZES = struct.Struct("<II")
 # LZF's longest back reference turns 3 bytes into 264.
 _MAX_EXPANSION = 88
+# pypcd4 makes a field of every value. The longest features of a point are SHOT's 352 and its colours' 1344.
+_MAX_POINT_VALUES = 4096
 
 
 def parse_pcd(data: bytes) -> NDArray[Any]:
@@ -57,6 +59,10 @@ def _parse_rows(metadata: MetaData, body: bytes) -> NDArray[Any]:
     if encoding is Encoding.ASCII:
         columns = [sum(metadata.count[: metadata.fields.index(axis)]) for axis in "xyz"]
         return parse_rows(body, columns, metadata.points)
+    if sum(metadata.count) > _MAX_POINT_VALUES:
+        raise CloudReadError(
+            f"has {sum(metadata.count)} values a point: at most {_MAX_POINT_VALUES} can be read"
+        )
     point_bytes = sum(size * count for size, count in zip(metadata.size, metadata.count, strict=True))
     declared = metadata.points * point_bytes
     if encoding is Encoding.BINARY:

@@ -35,7 +35,10 @@ def parse_depth_png(data: bytes) -> NDArray[np.uint16]:
         raise CloudReadError("is a colour image, not a depth image: give the 16-bit depth image beside it")
     if bits != 16:
         raise CloudReadError(f"{bits}-bit image, {2**bits} depth steps: not a depth image in 16 bit")
-    return _pixels(data).astype(np.uint16)
+    pixels = _pixels(data)
+    if pixels.ndim != 2 or pixels.dtype.itemsize < 2:  # Pillow believes the last of several headers
+        raise CloudReadError("is a damaged PNG image: it has two headers")
+    return pixels.astype(np.uint16)
 
 
 def parse_coarse_png(data: bytes) -> NDArray[np.uint8]:
