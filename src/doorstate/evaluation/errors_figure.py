@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections import defaultdict
 from collections.abc import Sequence
 
@@ -17,6 +18,7 @@ from doorstate.evaluation.samples_figure import draw_cloud, part_legend
 from doorstate.evaluation.views import STATE_WORDS, picture_axes
 
 _COLUMNS = 5
+_TITLE_LETTERS = 40  # of a line as wide as a picture
 
 
 def surest_errors_figure(results: ComparisonResults, dataset: PreparedDataset) -> Figure | None:
@@ -51,7 +53,8 @@ def common_errors_figure(results: ComparisonResults, dataset: PreparedDataset) -
     for place, errors in enumerate(shown):
         line, column = divmod(place, _COLUMNS)
         said = sorted({STATE_WORDS[error.predicted] for error in errors})
-        title = f"{STATE_WORDS[errors[0].state]} as {' or '.join(said)}\nby {', '.join(e.network for e in errors)}"
+        names = textwrap.fill(f"by {', '.join(each.network for each in errors)}", _TITLE_LETTERS)
+        title = f"{STATE_WORDS[errors[0].state]} as {' or '.join(said)}\n{names}"
         _draw(axes[2 * line][column], axes[2 * line + 1][column], dataset, errors[0], title)
     part_legend(figure, dataset, [dataset.index_of(errors[0].sample_id) for errors in shown])
     return figure
