@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 from benchmarks.fuzzer import FAILURES, LIMIT_MIB, LIMIT_S, OUTCOMES, TARGETS, Fuzzer
@@ -74,10 +75,10 @@ def fuzz_table(rows: Sequence[Group], first: int) -> Table:
     lines.append(["all", *(sum(row[outcome] for row in rows) for outcome in OUTCOMES)])
     cells = [(line[0], f"{sum(line[1:]):,}", *(f"{count:,}" for count in line[1:])) for line in lines]
     note = (
-        f"Inputs from number {first} on. *No state*: refused by the gate; *refused*: an error of one line; *crash*: "
-        f"anything else that is raised or warned of; *hang*: more than {LIMIT_S:g} s of processor time; *memory*: "
-        f"more than {LIMIT_MIB} MiB; *answer without data*: a state from fewer than {MIN_POINTS} measured points, "
-        "without the gate."
+        f"Inputs from number {first} on. *Answered*: a state, of a camera file through its camera; *no state*: none, "
+        "with the reason; *refused*: an error of one line; *crash*: anything else that is raised or warned of; *hang*: "
+        f"more than {LIMIT_S:g} s of processor time; *memory*: more than {LIMIT_MIB} MiB; *answer without data*: a "
+        f"state from fewer than {MIN_POINTS} measured points, without the gate."
     )
     failed = [
         f"{f['target']} {f['number']}: {f['outcome']}, {f['detail']}" for row in rows for f in row["failures"]
@@ -88,6 +89,11 @@ def fuzz_table(rows: Sequence[Group], first: int) -> Table:
 def _keep(folder: Path, number: int, target: str, given: Any) -> None:
     """A file as it is, a message as text."""
     is_file = isinstance(given, tuple)
-    suffix, content = given if is_file else (".json", json.dumps(given, default=repr, indent=1).encode())
+    suffix, content = given if is_file else (".json", json.dumps(given, default=_text, indent=1).encode())
     with atomic_path(folder / f"{number}-{target.strip('.').replace(' ', '-')}{suffix}") as temporary:
         temporary.write_bytes(content)
+
+
+def _text(value: Any) -> Any:
+    """A message by its fields, and what they hold that JSON does not."""
+    return vars(value) if isinstance(value, SimpleNamespace) else repr(value)
