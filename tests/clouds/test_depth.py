@@ -84,6 +84,12 @@ def test_is_the_plain_loop_in_float64_bit_for_bit(frame: tuple[NDArray[np.float3
             np.testing.assert_array_equal(points[v, u], np.array(expected).astype(np.float32))
 
 
+def test_what_overflows_is_no_return_and_no_warning() -> None:
+    camera = Intrinsics(width=4, height=3, fx=1e-300, fy=1.0, cx=1e300, cy=1e300)
+    points = depth_to_points(np.full((3, 4), 2.0, np.float32), camera)
+    assert np.isinf(points[..., 1:]).all()
+
+
 def test_optical_axes_become_body_axes() -> None:
     right, down, forward = np.eye(3, dtype=np.float32)
     body = points_from_optical(np.stack([right, down, forward]))

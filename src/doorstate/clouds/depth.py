@@ -39,10 +39,10 @@ def depth_to_points(depth_m: NDArray[np.floating], intrinsics: Intrinsics, roll_
     intrinsics.check_image_size(width, height)
     depth = depth_m.astype(np.float64)
     depth[~(np.isfinite(depth) & (depth > 0))] = np.nan
-    left_slope = (intrinsics.cx - np.arange(width)) / intrinsics.fx  # (W,)
-    up_slope = (intrinsics.cy - np.arange(height)) / intrinsics.fy  # (H,)
     points = np.empty((height, width, 3), dtype=np.float32)
     with np.errstate(over="ignore"):  # what overflows is as good as infinite: no return
+        left_slope = (intrinsics.cx - np.arange(width)) / intrinsics.fx  # (W,)
+        up_slope = (intrinsics.cy - np.arange(height)) / intrinsics.fy  # (H,)
         points[..., 0] = depth
         points[..., 1] = depth * left_slope
         points[..., 2] = depth * up_slope[:, None]
