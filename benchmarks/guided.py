@@ -28,6 +28,7 @@ with atheris.instrument_imports(include=["doorstate", "pypcd4", "PIL", "rosbags"
     from benchmarks.mutations import MESSAGES, sealed
 
 _SEEDS = 100
+_LONGEST_SEED = 1 << 16  # bytes: what unpacks to gigabytes is long, and mutants are as long as the longest
 _EVERY = 32  # pixels of 640 x 480: small inputs are quicker, and more of their bytes matter
 _OPTION_BYTES = 2  # at the end of an input: they choose how it is read
 
@@ -77,7 +78,7 @@ def _seed(fuzzer: Fuzzer, target: str, rng: np.random.Generator) -> bytes:
     if target in MESSAGES:
         return bags.serialized(draw_valid_message(rng, target, fuzzer.scene))
     content: bytes = fuzzer.draw_for(target, rng)[1]
-    return content
+    return content[:_LONGEST_SEED]
 
 
 def main(target: str, folder: Path, options: list[str]) -> bool:
