@@ -206,6 +206,30 @@ def thinning(
 
 
 @app.command()
+def onnx(
+    out: Out,
+    runs: Annotated[Path, typer.Option(help="A comparison whose weights to export.")] = Path("runs/paper"),
+    networks: Networks = "all",
+    fold: Fold = 0,
+    points: Annotated[int, typer.Option(help="Points that the files take.", min=128)] = 4096,
+    clouds: Annotated[int, typer.Option(help="Simulated clouds, of all states.", min=3)] = 102,
+) -> None:
+    """What exported files say beside torch, in float32 and with matrices of 8-bit integers."""
+    from benchmarks.onnx import measure, onnx_table
+    from doorstate.console import progress_bar
+    from doorstate.deployment.comparison_clouds import comparison_clouds
+    from doorstate.training.comparison import run_of
+
+    with progress_bar("Simulating clouds to compare on") as progress:
+        compared_on = comparison_clouds(clouds, points, progress)
+    rows = []
+    for name in _names(networks):
+        with progress_bar(name) as progress:
+            rows += measure(run_of(runs, name, fold).weights, compared_on, progress)
+    _finish(out, "onnx", rows, onnx_table(rows), runs=str(runs), fold=fold, points=points)
+
+
+@app.command()
 def gate(
     out: Out,
     data: Simulated,

@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -22,9 +23,10 @@ from benchmarks.broken_bags import BAG_SUFFIXES
 from benchmarks.fuzzer import BAG_FOLDER, CAMERA, OUTCOMES, TARGETS, Fuzzer
 from benchmarks.gate import FAULTS
 from benchmarks.mutations import MESSAGES
+from benchmarks.onnx import onnx_table
 
 from doorstate.dataset.store import PreparedDataset
-from doorstate.deployment.predictor import Prediction
+from doorstate.deployment.predictor import Prediction, packaged_weights
 from doorstate.errors import ConfigError, RunError
 from doorstate.jobs import no_progress
 from doorstate.rules import list_rules
@@ -282,6 +284,26 @@ def test_both_forms_train_alike(small_dataset: PreparedDataset, tmp_path: Path) 
     assert "| test |" in markdown
     assert (tmp_path / "curves" / "curves-pointnet2.png").read_bytes().startswith(b"\x89PNG")
     assert "fast and plain: pointnet2" in output
+
+
+def test_exported_files_are_set_beside_torch(tmp_path: Path) -> None:
+    comparison = tmp_path / "runs" / "pointnet2" / "fold0"
+    comparison.mkdir(parents=True)
+    shutil.copy(packaged_weights("pointnet2"), comparison / "weights.safetensors")
+    small = ("--networks", "pointnet2", "--points", 128, "--clouds", 3)
+    code, output, errors = run("onnx", "--runs", tmp_path, *small, "--out", tmp_path / "out")
+    assert (code, errors) == (0, "")
+    _, (exact, rounded), markdown = stored(tmp_path / "out", "onnx")
+    assert exact["largest"] <= 1e-4 < rounded["largest"]
+    assert exact["right"] == exact["right_in_torch"] == rounded["right_in_torch"]
+    assert rounded["megabytes"] < exact["megabytes"] / 2
+    assert "| pointnet2 | onnxruntime int8 |" in markdown
+    assert "Exported networks beside torch" in output
+
+
+def test_a_file_that_is_not_written_has_its_row() -> None:
+    table = onnx_table([{"network": "dgcnn", "form": "onnxruntime", "clouds": 3, "reason": "too far apart"}])
+    assert table.rows == (("dgcnn", "onnxruntime", "not written", *["–"] * 4),)
 
 
 def test_thinning_compares_answers(small_dataset: PreparedDataset, tmp_path: Path) -> None:
