@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 
 from benchmarks.store import Group
 from doorstate.deployment.comparison_clouds import LabelledClouds
-from doorstate.deployment.onnx_export import TOLERANCE, compare_with_torch, export_onnx
+from doorstate.deployment.onnx_export import TOLERANCE, export_onnx
 from doorstate.errors import ExportError
 from doorstate.evaluation.table import UNDEFINED, Table
 from doorstate.jobs import Progress
