@@ -13,7 +13,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from doorstate.dataset.splits import Role, write_splits
+from doorstate.dataset.splits import Role, read_splits, write_splits
 from doorstate.dataset.store import PreparedDataset, open_dataset
 from doorstate.simulation.settings import settings_for
 from doorstate.training.comparison import compare, load_experiment
@@ -167,3 +167,33 @@ def test_a_published_run_is_trained_again(
         assert (reproduce.again("pointnet", 3, "trial") is None) is inside
     published.metrics.unlink()
     assert "not all folds of pointnet are published" in reproduce.again("pointnet", 3, "trial")
+
+
+def test_a_fold_inside_a_fold_uses_nothing_that_the_outer_one_tests(
+    reproduce: ModuleType, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    import nested_splits
+
+    outer: dict[str, Role] = {
+        "a": "test",
+        "b": "unused",
+        "c": "train",
+        "d": "val",
+        "e": "train",
+        "f": "train",
+    }
+    inner: dict[str, Role] = {
+        "a": "train",
+        "b": "train",
+        "c": "test",
+        "d": "train",
+        "e": "val",
+        "f": "unused",
+    }
+    write_splits(tmp_path / "splits.csv", [outer, inner])
+    target = tmp_path / "choice" / "splits.csv"
+    command = ["nested_splits", str(tmp_path / "splits.csv"), "--inner", "1", "--out", str(target)]
+    monkeypatch.setattr(sys, "argv", command)
+    nested_splits.main()
+    (roles,) = read_splits(target)
+    assert list(roles.values()) == ["unused", "unused", "test", "train", "val", "unused"]

@@ -32,7 +32,7 @@ from doorstate.types import STATES
 # Semi-open doors are open by 15 to 65 degrees in this data set, open ones by 75 to 115 (docs/data-card.md).
 BORDER_DEG, NEAR_DEG = (15.0, 65.0, 75.0), 5.0
 NEARBY_M = 2.0
-SHOWN = ("paper", "by-pose", "authors", "related")  # what the page is about, or costs beside it
+SHOWN = ("paper", "by-pose", "by-pose-mirrored", "authors", "related")  # what the page is about, or costs beside it
 ASKED = 0.995  # macro-F1 that every network should reach
 BENCHMARK = Path(__file__).resolve().parents[1] / "docs" / "benchmarks" / "networks.json"
 NAMES = {
