@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from duels import NEARBY_M, duels_table, kinds_table, near_the_border, never_seen_table
 from published import rows_of
 from templates import template
 
@@ -29,10 +30,13 @@ from doorstate.training.recipes import AUTHORS
 from doorstate.training.run_folder import read_json
 from doorstate.types import STATES
 
-# Semi-open doors are open by 15 to 65 degrees in this data set, open ones by 75 to 115 (docs/data-card.md).
-BORDER_DEG, NEAR_DEG = (15.0, 65.0, 75.0), 5.0
-NEARBY_M = 2.0
-SHOWN = ("paper", "by-pose", "by-pose-mirrored", "authors", "related")  # what the page is about, or costs beside it
+SHOWN = (
+    "paper",
+    "by-pose",
+    "by-pose-mirrored",
+    "authors",
+    "related",
+)  # what the page is about, or costs beside it
 ASKED = 0.995  # macro-F1 that every network should reach
 BENCHMARK = Path(__file__).resolve().parents[1] / "docs" / "benchmarks" / "networks.json"
 NAMES = {
@@ -90,7 +94,7 @@ class Published:
     def kinds_of_errors(self) -> tuple[int, int, int]:
         """Errors of all networks; those whose opening is near the other state's; of the rest those taken nearby."""
         errors = [self.rows[error.sample_id] for error in self.results.error_rows]
-        far = [row for row in errors if not _near_the_border(float(row["opening_angle_deg"]))]
+        far = [row for row in errors if not near_the_border(row)]
         nearby = sum(float(row["distance_m"]) < NEARBY_M for row in far)
         return len(errors), len(errors) - len(far), nearby
 
@@ -133,7 +137,23 @@ def write_pages(results_folder: Path, reports_folder: Path, results_page: Path, 
     )
     if "paper" in published and "related" in published:
         both = [results_folder / name for name in ("paper", "related")]
-        render("related.md.j2", related_page, all=_published(both, reports_folder))
+        every = _published(both, reports_folder)
+        render("related.md.j2", related_page, all=every, **_duels(every, published.get("by-pose")))
+
+
+def _duels(every: Published, by_pose: Published | None) -> dict[str, Any]:
+    """Rules that tell all three states against networks."""
+    networks = every.results.comparison.networks
+    rules = [name for name in every.results.comparison.rules if every.hits(name, "semi_open")[0]]
+    best_rule = max(rules, key=every.macro_f1)
+    return {
+        "best_network": max(networks, key=every.macro_f1),
+        "best_rule": best_rule,
+        "beaten": [name for name in networks if every.macro_f1(name) < every.macro_f1(best_rule)],
+        "duels": _table(duels_table(every.results, rules, networks)),
+        "kinds": _table(kinds_table(every.results, every.rows, (*rules, *networks))),
+        "never_seen": _table(never_seen_table(every.results, by_pose.results, rules)) if by_pose else None,
+    }
 
 
 def _both(
@@ -259,10 +279,6 @@ def cuts_table(authors: Published, common: Published) -> Table:
         )
     columns = ("network", "fold", "epochs", "macro F1, authors' recipe", "macro F1, common recipe")
     return Table("The authors' recipes beside the common one", columns, tuple(rows))
-
-
-def _near_the_border(opening_angle_deg: float) -> bool:
-    return min(abs(opening_angle_deg - border) for border in BORDER_DEG) <= NEAR_DEG
 
 
 def _published(folders: Sequence[Path], reports_folder: Path) -> Published:
