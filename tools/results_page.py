@@ -72,6 +72,10 @@ class Published:
         counts = self.confusion[network]
         return int(counts.sum() - np.trace(counts))
 
+    def silent(self, method: str) -> int:
+        """Test samples to which a method gave no answer."""
+        return int(self.confusion[method][:, len(STATES) :].sum())
+
     def best(self) -> str:
         """Name of the network with the largest macro-F1."""
         return max(self.results.networks, key=self.macro_f1)
