@@ -17,6 +17,7 @@ from doorstate.files import write_text
 from doorstate.jobs import Shard, default_workers, piece_paths, run_pieces
 
 SCRIPT = """
+import signal
 import sys
 import time
 from pathlib import Path
@@ -30,6 +31,7 @@ def work(piece, path):
 
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # shells let what they start behind them ignore it
     folder = Path(sys.argv[1])
     run_pieces(work, [1, 2], piece_paths(folder, 2, ".txt"), 2)
 """
@@ -105,7 +107,10 @@ def test_workers_end_when_their_parent_is_ended(how: signal.Signals, tmp_path: P
             time.sleep(0.01)
         parent.send_signal(how)
         # Workers inherited the pipe and sleep for minutes: it ends early only if they are ended.
-        output, _ = parent.communicate(timeout=30)
+        try:
+            output, _ = parent.communicate(timeout=30)
+        finally:
+            parent.kill()
     assert output.count(b"Traceback") <= 1, "workers are silent"
 
 
