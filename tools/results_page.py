@@ -146,9 +146,11 @@ def write_pages(results_folder: Path, reports_folder: Path, results_page: Path, 
 
 
 def _duels(every: Published, by_pose: Published | None) -> dict[str, Any]:
-    """Rules that tell all three states against networks."""
+    """Rules that tell all three states against networks; nothing where there are none."""
     networks = every.results.comparison.networks
     rules = [name for name in every.results.comparison.rules if every.hits(name, "semi_open")[0]]
+    if not rules:
+        return {"best_rule": None}
     best_rule = max(rules, key=every.macro_f1)
     return {
         "best_network": max(networks, key=every.macro_f1),
