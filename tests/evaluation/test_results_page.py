@@ -79,7 +79,7 @@ def test_every_experiment_has_its_section(
     for part in ("## Poses never seen", "## The authors' own recipes", "## How many points", "| all |"):
         assert part in text
     assert "(related: angle_errors)" in related
-    assert "on the same 120 test samples (5 of five folds)" in related
+    assert "on the same 120 test samples (5 of 5 folds)" in related
 
 
 def test_what_is_missing_is_said(
