@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from doorstate.evaluation.metrics import confusion_matrix, scores
-from doorstate.evaluation.results import ComparisonResults, Predictions
+from doorstate.evaluation.results import ComparisonResults
 from doorstate.evaluation.table import Table, number
 from doorstate.types import STATES
 
@@ -29,7 +29,7 @@ def _aside(row: Row) -> bool:
     return abs(float(row["robot_angle_deg"]) - 90) > 90 - ASIDE_DEG
 
 
-KINDS: dict[str, Callable[[Row], bool]] = {
+CASES: dict[str, Callable[[Row], bool]] = {
     "all": lambda row: True,
     **{state: lambda row, state=state: row["state"] == state for state in STATES},  # type: ignore[misc]
     f"opening within {NEAR_DEG:.0f}° of another state": near_the_border,
@@ -39,14 +39,14 @@ KINDS: dict[str, Callable[[Row], bool]] = {
 }
 
 
-def kinds_table(results: ComparisonResults, rows: Mapping[str, Row], methods: Sequence[str]) -> Table:
-    """Accuracy of methods on kinds of samples; kinds overlap."""
-    right = {method: _right(results.pooled(method)) for method in methods}
+def cases_table(results: ComparisonResults, rows: Mapping[str, Row], methods: Sequence[str]) -> Table:
+    """Accuracy of methods on cases that may be hard; they overlap."""
+    right = {method: results.pooled(method).right_by_sample for method in methods}
     lines = []
-    for kind, belongs in KINDS.items():
+    for case, belongs in CASES.items():
         chosen = [sample for sample in right[methods[0]] if belongs(rows[sample])]
         shares = (float(np.mean([right[method][sample] for sample in chosen])) for method in methods)
-        lines.append((kind, str(len(chosen)), *(number(share) for share in shares)))
+        lines.append((case, str(len(chosen)), *(number(share) for share in shares)))
     return Table(
         "Accuracy by what the sample is", ("samples", "number", *methods), tuple(lines), "No answer is wrong."
     )
@@ -54,13 +54,13 @@ def kinds_table(results: ComparisonResults, rows: Mapping[str, Row], methods: Se
 
 def duels_table(results: ComparisonResults, rules: Sequence[str], networks: Sequence[str]) -> Table:
     """How many samples one of a pair has right and the other wrong."""
+    right = {network: results.pooled(network).right_by_sample for network in networks}
     lines = []
     for rule in rules:
         by_rule = results.pooled(rule)
         answered = dict(zip(by_rule.sample_ids, by_rule.predicted < len(STATES), strict=True))
-        rule_right = _right(by_rule)
-        for network in networks:
-            network_right = _right(results.pooled(network))
+        rule_right = by_rule.right_by_sample
+        for network, network_right in right.items():
             only_network = [s for s, right in rule_right.items() if network_right[s] and not right]
             only_rule = sum(right and not network_right[s] for s, right in rule_right.items())
             silent = sum(not answered[sample] for sample in only_network)
@@ -89,7 +89,3 @@ def never_seen_table(results: ComparisonResults, by_pose: ComparisonResults, rul
     return Table(
         "From places that no network has learned from", ("method", "macro F1", "errors"), tuple(lines)
     )
-
-
-def _right(predictions: Predictions) -> dict[str, bool]:
-    return dict(zip(predictions.sample_ids, predictions.right.tolist(), strict=True))

@@ -19,11 +19,7 @@ from doorstate.dataset.splits import Role, read_splits, write_splits
 
 def nested(outer: Mapping[str, Role], inner: Mapping[str, Role]) -> dict[str, Role]:
     """Roles in which the inner fold tests, of samples that the outer fold may learn from."""
-    roles: dict[str, Role] = {}
-    for sample, role in inner.items():
-        learned = outer[sample] in ("train", "val")
-        roles[sample] = role if learned else "unused"
-    return roles
+    return {sample: role if outer[sample] in ("train", "val") else "unused" for sample, role in inner.items()}
 
 
 def main() -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from duels import NEARBY_M, duels_table, kinds_table, near_the_border, never_seen_table
+from duels import NEARBY_M, cases_table, duels_table, near_the_border, never_seen_table
 from published import rows_of
 from templates import template
 
@@ -30,13 +30,8 @@ from doorstate.training.recipes import AUTHORS
 from doorstate.training.run_folder import read_json
 from doorstate.types import STATES
 
-SHOWN = (
-    "paper",
-    "by-pose",
-    "by-pose-mirrored",
-    "authors",
-    "related",
-)  # what the page is about, or costs beside it
+# What the page is about, or costs beside it.
+SHOWN = ("paper", "by-pose", "by-pose-mirrored", "authors", "related")
 ASKED = 0.995  # macro-F1 that every network should reach
 BENCHMARK = Path(__file__).resolve().parents[1] / "docs" / "benchmarks" / "networks.json"
 NAMES = {
@@ -157,7 +152,7 @@ def _duels(every: Published, by_pose: Published | None) -> dict[str, Any]:
         "best_rule": best_rule,
         "beaten": [name for name in networks if every.macro_f1(name) < every.macro_f1(best_rule)],
         "duels": _table(duels_table(every.results, rules, networks)),
-        "kinds": _table(kinds_table(every.results, every.rows, (*rules, *networks))),
+        "cases": _table(cases_table(every.results, every.rows, (*rules, *networks))),
         "never_seen": _table(never_seen_table(every.results, by_pose.results, rules)) if by_pose else None,
     }
 

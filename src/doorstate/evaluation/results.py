@@ -68,6 +68,11 @@ class Predictions:
         """(N,) whether the answer is the true state."""
         return np.equal(self.true, self.predicted)
 
+    @property
+    def right_by_sample(self) -> dict[str, bool]:
+        """Whether the answer is the true state, by sample."""
+        return dict(zip(self.sample_ids, self.right.tolist(), strict=True))
+
     def __len__(self) -> int:
         return len(self.sample_ids)
 

@@ -19,7 +19,7 @@ from doorstate.evaluation.metrics import (
     scores,
     wilson_interval,
 )
-from doorstate.evaluation.results import ComparisonResults, Predictions
+from doorstate.evaluation.results import ComparisonResults
 from doorstate.evaluation.stratum_tables import rows_of
 from doorstate.evaluation.table import UNDEFINED, Table, interval, mean_deviation, number, p_value
 from doorstate.types import ANSWERS, STATES, Indices
@@ -194,7 +194,7 @@ def folds_table(results: ComparisonResults) -> Table:
 
 def paired_table(results: ComparisonResults) -> Table:
     """Exact McNemar test of each pair of networks on the samples both were tested on."""
-    right = {network: _right_by_sample(results.pooled(network)) for network in results.networks}
+    right = {network: results.pooled(network).right_by_sample for network in results.networks}
     pairs, tests = list(combinations(results.networks, 2)), []
     for first, second in pairs:
         shared = sorted(right[first].keys() & right[second].keys())
@@ -221,7 +221,3 @@ def paired_table(results: ComparisonResults) -> Table:
         "independent; the states of one pose and neighbouring poses are not, so a small p is optimistic.",
         text_columns=2,
     )
-
-
-def _right_by_sample(predictions: Predictions) -> dict[str, bool]:
-    return dict(zip(predictions.sample_ids, predictions.right.tolist(), strict=True))
