@@ -19,6 +19,7 @@ from PIL import Image
 import doorstate
 from doorstate.clouds.pcd import write_pcd
 from doorstate.dataset.store import PreparedDataset
+from doorstate.deployment.predictor import packaged_networks
 from doorstate.networks import list_networks
 from doorstate.rules import list_rules
 
@@ -81,6 +82,9 @@ def test_info_names_versions_and_networks(run: Run) -> None:
     assert found["doorstate"] == doorstate.__version__
     assert [entry["network"] for entry in found["networks"]] == list_networks()
     assert {entry["parameters"] for entry in found["networks"]} >= {3_470_540, 1_466_179}
+    packaged = {entry["network"]: entry["packaged_weights"] for entry in found["networks"]}
+    assert "pointnet2" in packaged["pointnet2"]
+    assert sum(map(len, packaged.values())) == len(packaged_networks())
     assert run("info")[0] == 0
 
 

@@ -58,7 +58,7 @@ def _install(distribution: Path, environment: Path) -> Path:
 def _ask(binaries: Path, clouds: Mapping[str, Path]) -> None:
     """Every packaged network and a rule, of a door in every state; a wrong answer ends everything."""
     listed, _ = _timed([binaries / "doorstate", "info", "--json"])
-    packaged = [each["network"] for each in json.loads(listed)["networks"] if each["packaged_weights"]]
+    packaged = [name for each in json.loads(listed)["networks"] for name in each["packaged_weights"]]
     for options in (["--rule", "plane_state"], *(["--network", network] for network in packaged)):
         for state, path in clouds.items():
             said, seconds = _timed([binaries / "doorstate", "predict", path, *options, "--json"])

@@ -1,59 +1,92 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Put weights trained on everything into the package, as float16, with a model card each.
+"""Put trained weights into the package, as float16, with a model card each.
 
-python tools/package_weights.py runs/weights      # after `make reproduce EXPERIMENT=weights`
+python tools/package_weights.py runs/mixture           # the default weights, after `make publish EXPERIMENT=mixture`
+python tools/package_weights.py runs/weights ogurob-   # with a name before the network's
 
-How well the recipe does and how sure the answers are comes from the published cross-validation in results/. What tells
-of the packaged weights elsewhere is to be made anew then: CONTRIBUTING.md, "Publishing".
+Weights of protocol `all` have seen every sample: how well their recipe does and how sure the answers are comes from the
+published cross-validations. Others were tested themselves, and what is published of that test is what the card shows.
+What tells of the packaged weights elsewhere is to be made anew then: CONTRIBUTING.md, "Publishing".
 """
 
 from __future__ import annotations
 
 import hashlib
 import sys
+import tomllib
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from statistics import median
+from typing import Any, NamedTuple
 
+import numpy as np
+from published import rows_of
 from results_page import NAMES
 from templates import template
 from zoo_page import PAGE, page
 
 from doorstate.clouds.augment import Augmentation
+from doorstate.dataset.store import open_dataset
 from doorstate.evaluation.calibration import calibrate, reliability
+from doorstate.evaluation.factors import factors_table, kinds_table
+from doorstate.evaluation.head_tables import answers_table, presence_table
 from doorstate.evaluation.metrics import scores
+from doorstate.evaluation.resolution import load_resolution, resolution_table
 from doorstate.evaluation.results import ComparisonResults, load_results
 from doorstate.evaluation.score_tables import pooled_confusion
+from doorstate.evaluation.table import Table
+from doorstate.evaluation.transfer import load_transfer_results, transfer_table
 from doorstate.files import write_text
+from doorstate.training.calibration import abstain_threshold, at_temperature
 from doorstate.training.comparison import run_of
 from doorstate.training.run_folder import read_json
 from doorstate.training.weights import load_weights, save_weights
 from doorstate.types import STATES
 
 REPOSITORY = Path(__file__).resolve().parents[1]
-RESULTS = REPOSITORY / "results"
+RESULTS, EXPERIMENTS = REPOSITORY / "results", REPOSITORY / "experiments"
 WEIGHTS = REPOSITORY / "src" / "doorstate" / "deployment" / "weights"
-_MANY = 25e6
+_MANY = 25e6  # bytes of one set of networks
+_WRONG_SHARE = 0.01  # of the validation samples that are answered at all
 
 
-def main(folder: str) -> None:
-    """Package every network of a comparison with protocol `all`."""
-    rows = RESULTS / "ogurob-4096"
-    paper, by_pose = (load_results(RESULTS / name, rows) for name in ("paper", "by-pose"))
-    model_card = template("model_card.md.j2")
+class Evidence(NamedTuple):
+    """What is published of a network, as its weights and its card need it."""
+
+    temperature: float
+    abstain_below: float
+    card: str  # template
+    shown: dict[str, Any]  # in it
+
+
+def main(folder: str, prefix: str = "") -> None:
+    """Package every network of a comparison.
+
+    Args:
+        folder: of the comparison.
+        prefix: what comes before a network's name in the name of its weights.
+    """
+    asked = read_json(Path(folder) / "comparison.json")
+    evidence = _of_recipe() if asked["protocol"] == "all" else _of_weights(asked["name"])
     unchanged = Augmentation().model_dump(mode="json")
-    for name in read_json(Path(folder) / "comparison.json")["networks"]:
-        run = run_of(Path(folder), name, 0)
+    paths = []
+    for network_name in asked["networks"]:
+        name = f"{prefix}{network_name}"
+        found = evidence(network_name)
+        run = run_of(Path(folder), network_name, 0)
         network, card = load_weights(run.weights)
-        calibrated = calibrate(paper, name)
-        if calibrated is None:
-            sys.exit(f"results/paper: no validation answers of {name}")
-        temperature = round(median(calibrated.temperatures), 4)
         target = WEIGHTS / f"{name}.safetensors"
-        save_weights(target, network, card.model_copy(update={"temperature": temperature}), half=True)
+        save_weights(
+            target,
+            network,
+            card.model_copy(update={"temperature": found.temperature, "abstain_below": found.abstain_below}),
+            half=True,
+        )
         metrics, recipe = run.read_metrics(), read_json(run.config)["recipe"]
-        text = model_card.render(
+        text = template(found.card).render(
             name=name,
-            title=NAMES[name],
+            title=NAMES[network_name],
             parameters=sum(p.numel() for p in network.parameters()),
             recipe=recipe,
             augmentation={
@@ -64,27 +97,118 @@ def main(folder: str) -> None:
             environment=read_json(run.environment),
             minutes=metrics["seconds"] / 60,
             samples=metrics["train_samples"],
-            points=card.num_points,
-            temperature=temperature,
-            error=reliability(calibrated.true, calibrated.scaled).error,
-            found=[_found(results, name) for results in (paper, by_pose)],
+            weights=card,
+            temperature=found.temperature,
+            abstain_below=found.abstain_below,
             states=STATES,
             megabytes=target.stat().st_size / 1e6,
             sha256=hashlib.sha256(target.read_bytes()).hexdigest(),
+            **found.shown,
         )
         write_text(target.with_suffix(".md"), text)
+        paths.append(target)
         print(f"{target}: {target.stat().st_size / 1e6:.1f} MB")
     write_text(PAGE, page())
-    total = sum(path.stat().st_size for path in WEIGHTS.glob("*.safetensors"))
+    total = sum(path.stat().st_size for path in paths)
     print(f"together {total / 1e6:.1f} MB")
     if total > _MANY:
         sys.exit(f"more than {_MANY / 1e6:.0f} MB: too much for the package")
 
 
-def _found(results: ComparisonResults, network: str) -> dict[str, object]:
+def _of_recipe() -> Callable[[str], Evidence]:
+    """Scores of the recipe, cross-validated over the folds of two protocols."""
+    rows = RESULTS / "ogurob-4096"
+    paper, by_pose = (load_results(RESULTS / name, rows) for name in ("paper", "by-pose"))
+
+    def evidence(network: str) -> Evidence:
+        calibrated = calibrate(paper, network)
+        if calibrated is None:
+            sys.exit(f"results/paper: no validation answers of {network}")
+        return Evidence(
+            round(median(calibrated.temperatures), 4),
+            0.0,
+            "ogurob_card.md.j2",
+            {
+                "error": reliability(calibrated.true, calibrated.scaled).error,
+                "found": [
+                    {"protocol": each.comparison.protocol, **_scores(each, network)}
+                    for each in (paper, by_pose)
+                ],
+            },
+        )
+
+    return evidence
+
+
+def _of_weights(experiment: str) -> Callable[[str], Evidence]:
+    """Scores of the very weights on test samples of their own, in their world and in others."""
+    comparison = RESULTS / experiment
+    if not comparison.is_dir():
+        sys.exit(f"{comparison}: not published yet")
+    rows = rows_of(comparison, RESULTS)
+    results, dataset = load_results(comparison, rows), open_dataset(rows)
+
+    def evidence(network: str) -> Evidence:
+        (run,) = results.runs_of(network)
+        calibrated = calibrate(results, network)
+        if calibrated is None or run.validation is None:
+            sys.exit(f"{comparison}: no validation answers of {network}")
+        temperature = round(calibrated.temperatures[0], 4)
+        validated = at_temperature(run.validation.probabilities, temperature)
+        threshold = abstain_threshold(validated, run.validation.true, _WRONG_SHARE)
+        answered = calibrated.scaled.max(axis=1) >= threshold
+        right = calibrated.scaled.argmax(axis=1) == calibrated.true
+        tables = [
+            make(results, dataset) for make in (answers_table, presence_table, kinds_table, factors_table)
+        ]
+        return Evidence(
+            temperature,
+            threshold,
+            "worlds_card.md.j2",
+            {
+                "error": reliability(calibrated.true, calibrated.scaled).error,
+                "found": _scores(results, network),
+                "wrong_share": _WRONG_SHARE,
+                "answered": float(answered.mean()),
+                "right_of_answered": float(np.mean(right[answered])) if answered.any() else float("nan"),
+                "tables": [
+                    part.to_markdown().strip()
+                    for table in (*tables, *_studies(experiment))
+                    if (part := _of_network(table, network)).rows
+                ],
+            },
+        )
+
+    return evidence
+
+
+def _studies(experiment: str) -> Iterator[Table]:
+    """What studies that are published asked of the weights of an experiment."""
+    for path in sorted(EXPERIMENTS.glob("*.toml")):
+        folder, asked = RESULTS / path.stem, tomllib.loads(path.read_text(encoding="utf-8"))
+        if not folder.is_dir():
+            continue
+        if "points" in asked and asked["start_from"] == f"runs/{experiment}":
+            yield resolution_table(load_resolution(folder, RESULTS / Path(asked["dataset"]).name))
+        elif f"runs/{experiment}" in asked.get("trained", {}).values():
+            yield transfer_table(
+                load_transfer_results(folder, tuple(asked["trained"]), tuple(asked["tested"]), RESULTS)
+            )
+
+
+def _of_network(table: Table, network: str) -> Table:
+    """The lines of one network, without its name before each."""
+    return replace(
+        table,
+        columns=table.columns[1:],
+        rows=tuple(row[1:] for row in table.rows if row[0] == network),
+        text_columns=max(1, table.text_columns - 1),
+    )
+
+
+def _scores(results: ComparisonResults, network: str) -> dict[str, object]:
     score = scores(pooled_confusion(results, network))
     return {
-        "protocol": results.comparison.protocol,
         "samples": len(results.pooled(network)),
         "macro_f1": float(score.macro.f1),
         "recall": dict(zip(STATES, score.recall.tolist(), strict=True)),
@@ -92,6 +216,6 @@ def _found(results: ComparisonResults, network: str) -> dict[str, object]:
 
 
 if __name__ == "__main__":
-    if len(sys.argv) != 2:
+    if len(sys.argv) not in (2, 3):
         sys.exit(__doc__)
-    main(sys.argv[1])
+    main(*sys.argv[1:])

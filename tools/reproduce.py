@@ -111,14 +111,15 @@ def build(root: Path) -> None:
     with ProcessPoolExecutor(default_workers(), multiprocessing.get_context("spawn")) as pool:
         for report in [pool.submit(_report, root, *each) for each in _comparisons()]:
             report.result()
-    if (RESULTS / "resolution").is_dir():
-        rows = rows_of(RESULTS / "paper", RESULTS)
-        write_resolution(RESULTS / "resolution", root / "results" / "resolution" / "report", rows)
     for folder in RESULTS.glob("*/"):
         study = EXPERIMENTS / f"{folder.name}.toml"
-        if study.is_file() and "tested" in (asked := tomllib.loads(study.read_text(encoding="utf-8"))):
+        asked = tomllib.loads(study.read_text(encoding="utf-8")) if study.is_file() else {}
+        out = root / "results" / folder.name / "report"
+        if "points" in asked:
+            write_resolution(folder, out, RESULTS / Path(asked["dataset"]).name)
+        elif "tested" in asked:
             found = load_transfer_results(folder, tuple(asked["trained"]), tuple(asked["tested"]), RESULTS)
-            write_transfer(found, root / "results" / folder.name / "report")
+            write_transfer(found, out)
     results_page, related_page, worlds_page = (root / page for page in PAGES)
     write_pages(RESULTS, root / "results", results_page, related_page)
     write_worlds_page(RESULTS, root / "results", worlds_page)

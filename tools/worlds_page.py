@@ -19,7 +19,7 @@ from doorstate.evaluation.results import ComparisonResults, load_results
 from doorstate.evaluation.stratum_tables import rows_of as manifest_of
 from doorstate.evaluation.table import Table, number
 
-STUDIES = ("transfer", "augmentation")  # shown below, once they are published
+STUDIES = ("mixture-points", "transfer", "augmentation")  # shown below, once they are published
 
 
 class Target(NamedTuple):

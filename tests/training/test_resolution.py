@@ -31,6 +31,14 @@ def test_every_number_of_points_is_tested_and_all_but_the_largest_trained_on(tmp
     ]
 
 
+def test_without_fine_tuning_nothing_is_trained_and_heads_stay(tmp_path: Path) -> None:
+    text = STUDY.partition("[fine")[0] + 'protocol = "by-scene"\nheads = ["angle", "parts"]\n'
+    experiments = [each for _, each in load_study(write(tmp_path / "mine.toml", text)).experiments()]
+    assert [each.num_points for each in experiments] == [256, 512]
+    assert all(each.recipe_of("pointnet").epochs == 0 for each in experiments)
+    assert experiments[0].heads_of("point2sequence") == ("angle",)
+
+
 @pytest.mark.parametrize(
     ("text", "complaint"),
     [

@@ -113,9 +113,12 @@ def info(as_json: Annotated[bool, typer.Option("--json", help="As one JSON objec
         ) from error
 
     environment = describe_environment() | {"fpsample": HAS_FPSAMPLE}
-    packaged = packaged_networks()
     networks = [
-        (name, sum(p.numel() for p in create_network(name).parameters()), name in packaged)
+        (
+            name,
+            sum(p.numel() for p in create_network(name).parameters()),
+            [weights for weights in packaged_networks() if weights.rpartition("-")[2] == name],
+        )
         for name in list_networks()
     ]
     if as_json:
@@ -123,7 +126,7 @@ def info(as_json: Annotated[bool, typer.Option("--json", help="As one JSON objec
         print(json.dumps(environment | {"networks": listed, "rules": list_rules()}))  # noqa: T201
         return
     print_table("", ["", "value"], [[name, str(value)] for name, value in environment.items()])
-    rows = [[name, f"{count:,}", "yes" if weights else "no"] for name, count, weights in networks]
+    rows = [[name, f"{count:,}", ", ".join(weights) or "none"] for name, count, weights in networks]
     print_table("", ["network", "parameters", "weights in the package"], rows)
     print_table("", ["rule", "after"], [[name, create_rule(name).source] for name in list_rules()])
 

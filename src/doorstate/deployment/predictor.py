@@ -317,7 +317,7 @@ def median_milliseconds(predictor: Predictor, clouds: Sequence[Points], repeats:
 
 
 def packaged_networks() -> list[str]:
-    """Networks whose weights come with the package."""
+    """Names of the weights that come with the package: a network's, or `SET-NETWORK`."""
     return sorted(path.stem for path in _packaged("").parent.glob("*.safetensors"))
 
 

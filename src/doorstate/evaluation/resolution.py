@@ -67,27 +67,29 @@ def load_resolution(folder: Path, dataset_folder: Path | None = None) -> Resolut
 
 
 def resolution_table(results: ResolutionResults) -> Table:
-    """A line for each network and number of points."""
-    rows = []
-    for network in results.networks:
-        for points in results.points:
-            key = network, points
-            rows.append(
-                (
-                    network,
-                    str(points),
-                    number(results.as_trained.get(key, _NAN)),
-                    number(results.fine_tuned.get(key, _NAN)),
-                    number(results.milliseconds.get(key, _NAN), 1),
-                )
-            )
+    """A line for each network and number of points; a column for the fine-tuned only if there are some."""
+    columns = [("macro F1, as trained", results.as_trained, 4)]
+    if results.fine_tuned:
+        columns.append(("macro F1, fine-tuned", results.fine_tuned, 4))
+    columns.append(("ms from cloud to answer", results.milliseconds, 1))
+    rows = tuple(
+        (
+            network,
+            str(points),
+            *(number(found.get((network, points), _NAN), digits) for _, found, digits in columns),
+        )
+        for network in results.networks
+        for points in results.points
+    )
+    tuned = (
+        "Fine-tuned: the same weights trained a little more on so many points. " if results.fine_tuned else ""
+    )
     return Table(
         "Accuracy and time by number of points",
-        ("network", "points", "macro F1, as trained", "macro F1, fine-tuned", "ms from cloud to answer"),
-        tuple(rows),
-        "As trained: weights trained to the end on the largest number, given fewer points of each cloud. Fine-tuned: "
-        "the same weights trained a little more on so many points. Milliseconds: median from a raw 640 × 480 cloud in "
-        "memory to the state, float32.",
+        ("network", "points", *(name for name, _, _ in columns)),
+        rows,
+        "As trained: weights trained to the end on the largest number, given fewer points of each cloud. "
+        f"{tuned}Milliseconds: median from a raw 640 × 480 cloud in memory to the state, float32.",
     )
 
 
@@ -126,7 +128,8 @@ def resolution_figure(results: ResolutionResults) -> Figure:
             linewidth=1.4,
         )
     by_points.set_xscale("log", base=2)
-    by_points.set(xlabel="points (dotted: as trained, without fine-tuning)", ylabel="macro F1")
+    dotted = " (dotted: as trained, without fine-tuning)" if results.fine_tuned else ""
+    by_points.set(xlabel=f"points{dotted}", ylabel="macro F1")
     by_points.set_xticks(results.points, [str(points) for points in results.points], minor=False)
     by_time.set(xlabel="ms from raw cloud to answer")
     by_time.axvline(_FRAME_MS, color="#999999", linewidth=0.8, linestyle="--")

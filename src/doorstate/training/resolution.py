@@ -28,7 +28,8 @@ class ResolutionStudy(Frozen):
     folds: int = Field(default=1, ge=1)
     points: tuple[Annotated[int, Field(ge=MIN_POINTS)], ...] = Field(min_length=1)
     seed: int = 0
-    fine_tuning: dict[str, Any]  # fields of the common recipe
+    heads: tuple[str, ...] = ()  # those of the weights
+    fine_tuning: dict[str, Any] | None = None  # fields of the common recipe; without it nothing is trained
 
     def experiments(self) -> Iterator[tuple[str, Experiment]]:
         """Name and content of the comparisons that the study is made of, the coarsest first.
@@ -37,7 +38,7 @@ class ResolutionStudy(Frozen):
         """
         for points in sorted(self.points):
             yield self._experiment(AS_TRAINED, points, {"epochs": 0})
-            if points < max(self.points):
+            if self.fine_tuning is not None and points < max(self.points):
                 yield self._experiment(FINE_TUNED, points, self.fine_tuning)
 
     def _experiment(self, kind: str, points: int, changes: dict[str, Any]) -> tuple[str, Experiment]:
@@ -52,6 +53,7 @@ class ResolutionStudy(Frozen):
             seed=self.seed,
             recipe_changes=changes,
             start_from=self.start_from,
+            heads=self.heads,
         )
 
 
