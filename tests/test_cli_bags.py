@@ -194,3 +194,12 @@ def test_usage_errors_are_one_line(
     assert len(err.splitlines()) == 1
     assert err.startswith("doorstate: ")
     assert complaint in err
+
+
+def test_a_recording_that_cannot_be_used_is_told_before_weights_are_looked_for(
+    predict: Run, bag: Path, tmp_path: Path
+) -> None:
+    gone = tmp_path / "gone.safetensors"
+    assert "gone.bag: no such file" in predict("--bag", tmp_path / "gone.bag", "--weights", gone)[2]
+    assert "usable are" in predict("--bag", bag, "--topic", "/gone", "--weights", gone)[2]
+    assert "gone.safetensors" in predict("--bag", bag, "--weights", gone)[2]

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -84,11 +85,11 @@ def predict(
         raise ConfigError(f"--out {out}: name a {' or '.join(WRITERS)} file")
     options = read_options(frame, roll, units, depth_scale, intrinsics, (fx, fy, cx, cy))
     found = find_clouds(files or [])
-    predictor = load_predictor(network, weights, rule, points)
+    load = partial(load_predictor, network, weights, rule, points)
     if bag is None:
-        _predict_files(predictor, found, options, as_json)
+        _predict_files(load(), found, options, as_json)
     else:
-        predict_bag(predictor, bag, options, topic, camera_info_topic, every, out, as_json)
+        predict_bag(load, bag, options, topic, camera_info_topic, every, out, as_json)
 
 
 def info(as_json: Annotated[bool, typer.Option("--json", help="As one JSON object.")] = False) -> None:

@@ -24,7 +24,7 @@ Write = Callable[[dict[str, Any]], None]
 
 
 def predict_bag(
-    predictor: Any,
+    load: Callable[[], Any],
     path: Path,
     options: ReadOptions,
     topic: str | None,
@@ -40,6 +40,7 @@ def predict_bag(
     count = failures = 0
     with open_bag(path) as bag:
         chosen = bag.choose(topic)
+        predictor = load()  # takes a second: a recording that cannot be used is told before
         total = -(-chosen.messages // every)
         clouds = bag.clouds(chosen, options, camera_info_topic, every)
         with _destination(out, as_json) as write, progress_bar("Predicting") as progress:
