@@ -39,12 +39,19 @@ CASES: dict[str, Callable[[Row], bool]] = {
 }
 
 
-def cases_table(results: ComparisonResults, rows: Mapping[str, Row], methods: Sequence[str]) -> Table:
-    """Accuracy of methods on cases that may be hard; they overlap."""
+def cases_table(
+    results: ComparisonResults,
+    rows: Mapping[str, Row],
+    methods: Sequence[str],
+    cases: Mapping[str, Callable[[Row], bool]] = CASES,
+) -> Table:
+    """Accuracy of methods on cases that may be hard; they overlap, and one without samples is left out."""
     right = {method: results.pooled(method).right_by_sample for method in methods}
     lines = []
-    for case, belongs in CASES.items():
+    for case, belongs in cases.items():
         chosen = [sample for sample in right[methods[0]] if belongs(rows[sample])]
+        if not chosen:
+            continue
         shares = (float(np.mean([right[method][sample] for sample in chosen])) for method in methods)
         lines.append((case, str(len(chosen)), *(number(share) for share in shares)))
     return Table(

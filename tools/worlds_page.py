@@ -3,11 +3,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from duels import FEW_PIXELS, NEARBY_M, cases_table
 from published import rows_of
 from results_page import NAMES, render, whole_folds
 
@@ -19,6 +20,20 @@ from doorstate.evaluation.results import ComparisonResults, load_results
 from doorstate.evaluation.stratum_tables import rows_of as manifest_of
 from doorstate.evaluation.table import Table, number
 
+FEW_MEASURED = 150_000  # of the 307,200 pixels of an image
+# Where there is little to fit a plane to, or the planes are not those of leaf and wall.
+CASES: dict[str, Callable[[Mapping[str, str]], bool]] = {
+    "all doors": lambda row: True,
+    "a window in the leaf": lambda row: row["door_kind"] == "glazed",
+    "a leaf of glass": lambda row: row["door_kind"] == "full_glass",
+    "sliding": lambda row: row["door_kind"] == "sliding",
+    "two leaves": lambda row: row["door_kind"].startswith("double"),
+    "a quarter of the door hidden, or more": lambda row: float(row["occluded_share"]) >= 0.25,
+    f"leaf below {FEW_PIXELS} pixels": lambda row: float(row["visible_leaf_px"]) < FEW_PIXELS,
+    f"frame below {FEW_PIXELS} pixels": lambda row: float(row["visible_frame_px"]) < FEW_PIXELS,
+    f"fewer than {FEW_MEASURED} measured pixels": lambda row: float(row["measured_px"]) < FEW_MEASURED,
+    f"from nearer than {NEARBY_M:.0f} m": lambda row: float(row["distance_m"]) < NEARBY_M,
+}
 STUDIES = ("mixture-points", "transfer", "augmentation")  # shown below, once they are published
 
 
@@ -110,14 +125,34 @@ def write_worlds_page(results_folder: Path, reports_folder: Path, page: Path) ->
         }
         for name in ("mixture", *STUDIES)
     }
+    rules = results.comparison.rules
+    networks = tuple(method for method in results.networks if method not in rules)
+    rows = {row["sample_id"]: row for row in open_dataset(rows_of(mixture, results_folder)).rows}
+    cases = cases_table(results, rows, results.networks, CASES)
     render(
         "worlds.md.j2",
         page,
         results=results,
-        targets=targets_table(results_folder, results.networks).to_markdown().strip(),
+        targets=targets_table(results_folder, networks).to_markdown().strip(),
         tables=tables,
-        trained={run.network: int(run.metric("train_samples")) for run in results.runs},
+        trained=max(int(run.metric("train_samples")) for run in results.runs if run.network in networks),
+        cases=cases.to_markdown().strip() if rules else "",
+        rules=rules,
+        lost=_lost(cases, rules),
     )
+
+
+def _lost(cases: Table, rules: Sequence[str]) -> list[str]:
+    """Cases in which some rule is right more often than every network."""
+    shares = [dict(zip(cases.columns, row, strict=True)) for row in cases.rows]
+    methods = cases.columns[2:]
+    return [
+        row["samples"]
+        for row in shares
+        if rules
+        and max(float(row[method]) for method in methods if method in rules)
+        > max(float(row[method]) for method in methods if method not in rules)
+    ]
 
 
 def targets_table(results_folder: Path, networks: Sequence[str]) -> Table:
@@ -129,7 +164,11 @@ def targets_table(results_folder: Path, networks: Sequence[str]) -> Table:
         if comparison.is_dir():
             folder = rows_of(comparison, results_folder)
             results, dataset = load_results(comparison, folder), open_dataset(folder)
-            found |= {network: target.found(results, dataset, network) for network in results.networks}
+            found |= {
+                network: target.found(results, dataset, network)
+                for network in results.networks
+                if network in networks
+            }
         good = [NAMES[network] for network in networks if target.reached(found[network])]
         rows.append(
             (

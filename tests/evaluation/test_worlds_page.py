@@ -61,10 +61,24 @@ def published(scene_dataset: PreparedDataset, tmp_path: Path) -> Path:
                 missed += 1
                 row["predicted"] = "closed" if row["state"] == "open" else "open"
         write_csv(path, answers)
+    _add_rule(root / "mixture")
     write_everything([root / "mixture"], root / "mixture" / "report", dataset)
     found = load_transfer_results(root / "transfer", ("mixture",), ("cluttered",), root)
     write_transfer(found, root / "transfer" / "report")
     return root
+
+
+def _add_rule(folder: Path) -> None:
+    """A rule that takes every semi-open door for a closed one."""
+    asked = json.loads((folder / "comparison.json").read_text())
+    (folder / "comparison.json").write_text(json.dumps(asked | {"rules": ["plane_state"]}))
+    for path in (folder / "runs" / "pointnet2").glob("fold*/predictions.csv"):
+        run = RunFolder(folder / "runs" / "plane_state" / path.parent.name)
+        rows = read_csv(path)
+        for row in rows:
+            row["predicted"] = "closed" if row["state"] == "semi_open" else row["state"]
+        write_csv(run.predictions, [row | {"reason": "", "opening_angle_deg": ""} for row in rows])
+        run.finish({"test_macro_f1": 0.5})
 
 
 def test_what_was_asked_for_stands_beside_what_is_reached(
@@ -87,6 +101,9 @@ def test_what_was_asked_for_stands_beside_what_is_reached(
     assert "## How far weights carry" in text
     assert "## What each augmentation is worth" not in text
     assert "(20 clouds, one fold" in text
+    assert lines["all doors"] == ["24", "1.0000", "0.6667"]
+    assert "Rules that fit planes (`plane_state`;" in text
+    assert "For no kind of sample is a rule right more often" in text
 
 
 def test_without_the_mixture_there_is_no_page(worlds: ModuleType, tmp_path: Path) -> None:

@@ -65,6 +65,7 @@ FACTORS = (
     Factor("heading beside the door's middle, degrees", _heading_off_deg, tuple(range(-20, 21, 5))),
     Factor("camera height, m", _column("camera_height_m"), (0.25, 0.4, 0.6, 0.8, 1.0, 1.2)),
     Factor("camera pitch, degrees", _column("pitch_deg"), (-10, -6, -2, 2, 6, 10)),
+    Factor("pixels of the leaf", _column("visible_leaf_px"), (0, 5e3, 1e4, 2e4, 3e4, 4e4, 6e4, 1e5, 2e5)),
     Factor("occluded share of the door", _column("occluded_share"), (0, 0.001, 0.25, 0.5, 0.75)),
 )
 
