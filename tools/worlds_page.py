@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -17,6 +18,7 @@ from doorstate.evaluation.calibration import calibrate, reliability
 from doorstate.evaluation.head_tables import answer_errors
 from doorstate.evaluation.metrics import confusion_matrix, scores
 from doorstate.evaluation.results import ComparisonResults, load_results
+from doorstate.evaluation.stratum_tables import is_undecidable
 from doorstate.evaluation.stratum_tables import rows_of as manifest_of
 from doorstate.evaluation.table import Table, number
 
@@ -52,10 +54,18 @@ class Target(NamedTuple):
         return bool(value >= self.bound if self.more_is_better else value <= self.bound)
 
 
-def _noisy_macro_f1(results: ComparisonResults, dataset: PreparedDataset, network: str) -> float:
+def _noisy_macro_f1(
+    results: ComparisonResults, dataset: PreparedDataset, network: str, undecidable: bool = True
+) -> float:
     pooled = results.pooled(network)
-    rows = manifest_of(dataset, pooled)
-    chosen = np.array([row["sensor"] == "xtion" and row["pose_id"].startswith("varied-") for row in rows])
+    chosen = np.array(
+        [
+            row["sensor"] == "xtion"
+            and row["pose_id"].startswith("varied-")
+            and (undecidable or not is_undecidable(row))
+            for row in manifest_of(dataset, pooled)
+        ]
+    )
     return float(scores(confusion_matrix(pooled.true[chosen], pooled.predicted[chosen])).macro.f1)
 
 
@@ -83,6 +93,13 @@ def _head(name: str, factor: float = 1.0) -> Callable[[ComparisonResults, Prepar
 
 TARGETS = (
     Target("macro F1 of three states, `varied` as an Xtion sees it", 0.97, True, 4, _noisy_macro_f1),
+    Target(
+        "the same without frames that look alike in another state",
+        0.97,
+        True,
+        4,
+        partial(_noisy_macro_f1, undecidable=False),
+    ),
     Target("AUROC of *there is a door*", 0.99, True, 4, _head("door, AUROC")),
     Target("expected calibration error, %", 3, False, 1, _calibration_error),
     Target(
