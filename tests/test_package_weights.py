@@ -15,7 +15,7 @@ from doorstate.dataset.store import PreparedDataset
 from doorstate.deployment.predictor import Predictor, packaged_networks, packaged_weights
 from doorstate.evaluation.results import load_results
 from doorstate.training.calibration import at_temperature
-from doorstate.training.comparison import Experiment, compare
+from doorstate.training.comparison import Experiment, compare, prepare_comparison
 from doorstate.training.weights import read_card
 from doorstate.types import NO_DOOR
 
@@ -69,6 +69,9 @@ def test_weights_are_packaged_with_a_temperature_and_a_card(
         compare(experiment, tmp_path / "results" / name)
     everything = Experiment.model_validate(common | {"name": "weights", "protocol": "all", "folds": 1})
     compare(everything, tmp_path / "weights")
+    prepare_comparison(everything.model_copy(update={"networks": ("pointnet", "dgcnn")}), tmp_path / "half")
+    tool.main(str(tmp_path / "half"))
+    assert list(package.iterdir()) == [], "nothing is trained there yet"
     (tmp_path / "results" / "ogurob-4096").symlink_to(small_dataset.folder)
     tool.main(str(tmp_path / "weights"))
 

@@ -61,7 +61,7 @@ class Evidence(NamedTuple):
 
 
 def main(folder: str, prefix: str = "") -> None:
-    """Package every network of a comparison.
+    """Package every network of a comparison that has been trained there.
 
     Args:
         folder: of the comparison.
@@ -73,8 +73,11 @@ def main(folder: str, prefix: str = "") -> None:
     paths = []
     for network_name in asked["networks"]:
         name = f"{prefix}{network_name}"
-        found = evidence(network_name)
         run = run_of(Path(folder), network_name, 0)
+        if not (run.finished and run.weights.is_file()):
+            print(f"{name}: not trained in {folder}, left as it is")
+            continue
+        found = evidence(network_name)
         network, card = load_weights(run.weights)
         target = WEIGHTS / f"{name}.safetensors"
         save_weights(
