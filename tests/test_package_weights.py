@@ -69,10 +69,10 @@ def test_weights_are_packaged_with_a_temperature_and_a_card(
         compare(experiment, tmp_path / "results" / name)
     everything = Experiment.model_validate(common | {"name": "weights", "protocol": "all", "folds": 1})
     compare(everything, tmp_path / "weights")
+    (tmp_path / "results" / "ogurob-4096").symlink_to(small_dataset.folder)
     prepare_comparison(everything.model_copy(update={"networks": ("pointnet", "dgcnn")}), tmp_path / "half")
     tool.main(str(tmp_path / "half"))
     assert list(package.iterdir()) == [], "nothing is trained there yet"
-    (tmp_path / "results" / "ogurob-4096").symlink_to(small_dataset.folder)
     tool.main(str(tmp_path / "weights"))
 
     card = read_card(package / "pointnet.safetensors")
