@@ -109,7 +109,8 @@ def build(root: Path) -> None:
 
     # spawn: a forked child of a process that runs BLAS threads can hang.
     with ProcessPoolExecutor(default_workers(), multiprocessing.get_context("spawn")) as pool:
-        for report in [pool.submit(_report, root, *each) for each in _comparisons()]:
+        longest_first = sorted(_comparisons(), key=lambda each: len(each[0]) * each[1], reverse=True)
+        for report in [pool.submit(_report, root, *each) for each in longest_first]:
             report.result()
     for folder in RESULTS.glob("*/"):
         study = EXPERIMENTS / f"{folder.name}.toml"

@@ -56,6 +56,21 @@ def test_a_data_set_without_clouds_makes_the_same_ones_from_its_rows(
         _ = rows.clouds
     (raw,) = rows.raw_clouds(1)
     np.testing.assert_array_equal(raw, replay(unflatten(rows.rows[0])).points)
+    raw[:] = 0
+    np.testing.assert_array_equal(rows.raw_cloud(0), replay(unflatten(rows.rows[0])).points)
+
+
+def test_of_replayed_clouds_only_so_many_are_kept(
+    undisturbed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stored = open_dataset(undisturbed)
+    shutil.copy(undisturbed / MANIFEST, tmp_path)
+    stored.description.model_copy(update={"clouds": "replayed"}).save(tmp_path)
+    rows = open_dataset(tmp_path)
+    monkeypatch.setattr("doorstate.dataset.store._KEPT_CLOUDS", 2)
+    for index in (0, 1, 2, 1, 0):
+        np.testing.assert_array_equal(rows.cloud(index), stored.cloud(index))
+        assert len(rows._made) <= 2
 
 
 def test_clouds_and_parts_are_those_of_the_replayed_rows(tiny_simulation: Path, tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from functools import cached_property
 from pathlib import Path
-from typing import Literal
+from typing import Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,13 +18,15 @@ from doorstate.dataset.sampled import sample_frame
 from doorstate.errors import ConfigError, DatasetError, first_problem
 from doorstate.files import read_csv, write_text
 from doorstate.models import Frozen
-from doorstate.simulation.frames import replay
+from doorstate.simulation.frames import Frame, replay
 from doorstate.simulation.manifest import unflatten
 from doorstate.simulation.shading import shade
 from doorstate.types import NO_DOOR, STATES, Indices, Points
 
 MANIFEST, CLOUDS, PARTS, DESCRIPTION = "manifest.csv", "clouds.npy", "parts.npy", "dataset.json"
 _LABELS = (*STATES, NO_DOOR)
+_KEPT_CLOUDS = 512  # of those that are not stored
+_T = TypeVar("_T")
 
 
 class DatasetDescription(Frozen):
@@ -63,6 +65,7 @@ class PreparedDataset:
         self._clouds = clouds
         self._parts = parts
         self._made: dict[int, tuple[Points, NDArray[np.uint8]]] = {}
+        self._rendered: dict[int, Frame] = {}
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -142,17 +145,26 @@ class PreparedDataset:
     def _make(self, index: int, num_points: int | None) -> tuple[Points, NDArray[np.uint8]]:
         count = num_points or self.num_points
         if index not in self._made or len(self._made[index][0]) < count:
-            self._made[index] = sample_frame(
-                replay(unflatten(self.rows[index])), count, self.description.max_depth_m
+            _keep(
+                self._made,
+                index,
+                sample_frame(self._frame(index), count, self.description.max_depth_m),
+                _KEPT_CLOUDS,
             )
         points, parts = self._made[index]
         return points[:count], parts[:count]
+
+    def _frame(self, index: int) -> Frame:
+        """The frame of a row, rendered anew; the last one is kept, for its picture and its cloud."""
+        if index not in self._rendered:
+            _keep(self._rendered, index, replay(unflatten(self.rows[index])), 1)
+        return self._rendered[index]
 
     def raw_cloud(self, index: int) -> Points:
         """(H, W, 3) metres as the sensor gives them, rendered anew; of imported clouds what is stored."""
         if self.description.kind != "simulated":
             return self.cloud(index)
-        return replay(unflatten(self.rows[index])).points
+        return self._frame(index).points.copy()
 
     def raw_clouds(self, count: int) -> list[Points]:
         """`raw_cloud` of so many samples, spread over the data set."""
@@ -163,8 +175,14 @@ class PreparedDataset:
         """(H, W, 3) shaded picture, rendered anew from the row; None for imported clouds."""
         if self.description.kind != "simulated":
             return None
-        row = unflatten(self.rows[index])
-        return shade(replay(row).full, row.camera.intrinsics())
+        return shade(self._frame(index).full, unflatten(self.rows[index]).camera.intrinsics())
+
+
+def _keep(kept: dict[int, _T], index: int, value: _T, most: int) -> None:
+    """Put a value among the kept ones in place of the oldest, if there are `most` already."""
+    if len(kept) >= most:
+        kept.pop(next(iter(kept)))
+    kept[index] = value
 
 
 def open_dataset(folder: Path) -> PreparedDataset:

@@ -23,7 +23,8 @@ COLORS = {
 _PALETTE = np.zeros((256, 3), dtype=np.float32)
 for _part, _color in COLORS.items():
     _PALETTE[_part] = _color
-_LAMP = np.array([-0.75, 0.45, 0.48])  # towards the light, in the sensor frame
+_TOWARDS_LAMP = np.array([-0.75, 0.45, 0.48])  # in the sensor frame
+_LAMP = (_TOWARDS_LAMP / np.linalg.norm(_TOWARDS_LAMP)).astype(np.float32)
 
 
 def shade(rendered: Render, intrinsics: Intrinsics) -> NDArray[np.uint8]:
@@ -32,12 +33,16 @@ def shade(rendered: Render, intrinsics: Intrinsics) -> NDArray[np.uint8]:
     Returns:
         (H, W, 3) uint8 RGB.
     """
-    points = depth_to_points(np.where(np.isinf(rendered.depth_m), 1e3, rendered.depth_m), intrinsics)
-    down, right = np.gradient(points.astype(np.float64), axis=(0, 1))
-    normal = np.cross(right, down)
-    normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-12)
+    points = depth_to_points(
+        np.where(np.isinf(rendered.depth_m), np.float32(1e3), rendered.depth_m), intrinsics
+    )
+    # Coordinate by coordinate takes a quarter of the time of gradients and cross products of (H, W, 3).
+    (dx, rx), (dy, ry), (dz, rz) = (np.gradient(each) for each in np.moveaxis(points, -1, 0).copy())
+    normal = (ry * dz - rz * dy, rz * dx - rx * dz, rx * dy - ry * dx)
+    length = np.sqrt(sum(each * each for each in normal))
+    across = sum(each * towards for each, towards in zip(normal, _LAMP, strict=True))
     # Faces are lit from both sides: the sign of a depth gradient's normal says nothing here.
-    light = 0.45 + 0.55 * np.abs(normal @ _LAMP) / np.linalg.norm(_LAMP)
+    light = 0.45 + 0.55 * np.abs(across) / np.maximum(length, 1e-12)
     nothing = rendered.part == Part.NONE
     light[nothing] = 1.0
     shaded: NDArray[np.uint8] = np.clip(_PALETTE[rendered.part] * light[..., None], 0, 255).astype(np.uint8)
