@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import hashlib
 import sys
-import tomllib
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -23,6 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from published import rows_of
 from results_page import NAMES
+from studies import read_asked, study_table
 from templates import template
 from zoo_page import PAGE, page
 
@@ -32,11 +32,9 @@ from doorstate.evaluation.calibration import calibrate, reliability
 from doorstate.evaluation.factors import factors_table, kinds_table
 from doorstate.evaluation.head_tables import answers_table, presence_table
 from doorstate.evaluation.metrics import scores
-from doorstate.evaluation.resolution import load_resolution, resolution_table
 from doorstate.evaluation.results import ComparisonResults, load_results
 from doorstate.evaluation.score_tables import pooled_confusion
 from doorstate.evaluation.table import Table
-from doorstate.evaluation.transfer import load_transfer_results, transfer_table
 from doorstate.files import write_text
 from doorstate.training.calibration import abstain_threshold, at_temperature
 from doorstate.training.comparison import run_of
@@ -187,16 +185,9 @@ def _of_weights(experiment: str) -> Callable[[str], Evidence]:
 
 def _studies(experiment: str) -> Iterator[Table]:
     """What studies that are published asked of the weights of an experiment."""
-    for path in sorted(EXPERIMENTS.glob("*.toml")):
-        folder, asked = RESULTS / path.stem, tomllib.loads(path.read_text(encoding="utf-8"))
-        if not folder.is_dir():
-            continue
-        if "points" in asked and asked["start_from"] == f"runs/{experiment}":
-            yield resolution_table(load_resolution(folder, RESULTS / Path(asked["dataset"]).name))
-        elif f"runs/{experiment}" in asked.get("trained", {}).values():
-            yield transfer_table(
-                load_transfer_results(folder, tuple(asked["trained"]), tuple(asked["tested"]), RESULTS)
-            )
+    for asked in map(read_asked, sorted(EXPERIMENTS.glob("*.toml"))):
+        if experiment in asked.begins_with and (RESULTS / asked.name).is_dir():
+            yield study_table(asked, RESULTS)
 
 
 def _of_network(table: Table, network: str) -> Table:

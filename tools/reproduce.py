@@ -13,7 +13,6 @@ from __future__ import annotations
 import multiprocessing
 import sys
 import tempfile
-import tomllib
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
@@ -21,10 +20,10 @@ from pathlib import Path
 from data_sets import commands
 from doorstate_command import REPOSITORY, doorstate
 from published import publish, rows_of
+from studies import read_asked, write_study
 
 RESULTS, RUNS, EXPERIMENTS = REPOSITORY / "results", REPOSITORY / "runs", REPOSITORY / "experiments"
 PAGES = tuple(Path("docs") / name for name in ("results.md", "related.md", "worlds.md"))
-STUDIES = {"transfer": "tested", "resolution": "points"}  # commands, and what only their files say
 BESIDE = {"related": "paper"}  # is shown beside the methods of another comparison
 
 
@@ -48,15 +47,14 @@ def main(arguments: list[str]) -> None:
 
 def run(name: str) -> None:
     """Simulate, prepare and run one experiment, and before it those it begins with; every step prints its command."""
-    asked = tomllib.loads((EXPERIMENTS / f"{name}.toml").read_text(encoding="utf-8"))
-    for before in asked.get("trained", {}).values() or filter(None, [asked.get("start_from")]):
-        run(Path(before).name)
-    for dataset in asked.get("tested", {}).values() or [asked["dataset"]]:
+    asked = read_asked(EXPERIMENTS / f"{name}.toml")
+    for before in asked.begins_with:
+        run(before)
+    for dataset in asked.datasets:
         for command in commands(REPOSITORY / dataset):
             doorstate(command)
-    study = next((study for study, key in STUDIES.items() if key in asked), None)
-    doorstate(f"{study or 'compare'} experiments/{name}.toml --jobs 2")
-    if study is None and asked.get("protocol") != "all":
+    doorstate(f"{asked.command} experiments/{name}.toml --jobs 2")
+    if asked.command == "compare" and asked.content.get("protocol") != "all":
         doorstate(f"report runs/{name}")
 
 
@@ -103,8 +101,6 @@ def build(root: Path) -> None:
     from results_page import write_pages
     from worlds_page import write_worlds_page
 
-    from doorstate.evaluation.resolution import write_resolution
-    from doorstate.evaluation.transfer import load_transfer_results, write_transfer
     from doorstate.jobs import default_workers
 
     # spawn: a forked child of a process that runs BLAS threads can hang.
@@ -112,15 +108,9 @@ def build(root: Path) -> None:
         longest_first = sorted(_comparisons(), key=lambda each: len(each[0]) * each[1], reverse=True)
         for report in [pool.submit(_report, root, *each) for each in longest_first]:
             report.result()
-    for folder in RESULTS.glob("*/"):
-        study = EXPERIMENTS / f"{folder.name}.toml"
-        asked = tomllib.loads(study.read_text(encoding="utf-8")) if study.is_file() else {}
-        out = root / "results" / folder.name / "report"
-        if "points" in asked:
-            write_resolution(folder, out, RESULTS / Path(asked["dataset"]).name)
-        elif "tested" in asked:
-            found = load_transfer_results(folder, tuple(asked["trained"]), tuple(asked["tested"]), RESULTS)
-            write_transfer(found, out)
+    for asked in map(read_asked, sorted(EXPERIMENTS.glob("*.toml"))):
+        if asked.command != "compare" and (RESULTS / asked.name).is_dir():
+            write_study(asked, RESULTS, root / "results" / asked.name / "report")
     results_page, related_page, worlds_page = (root / page for page in PAGES)
     write_pages(RESULTS, root / "results", results_page, related_page)
     write_worlds_page(RESULTS, root / "results", worlds_page)
