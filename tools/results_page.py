@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 from duels import NEARBY_M, cases_table, duels_table, near_the_border, never_seen_table
+from extrapolation import places_cases
 from published import rows_of
 from templates import template
 
@@ -126,6 +127,7 @@ def write_pages(results_folder: Path, reports_folder: Path, results_page: Path, 
         waiting={name: runs for name, runs in waiting.items() if runs},
         budget=_table(budget_table(list(published.values()))),
         gap=_both(published, "by-pose", gap_table),
+        places=_both(published, "by-pose", lambda _, by_pose: places_table(by_pose)),
         cuts=_both(published, "authors", lambda paper, authors: cuts_table(authors, paper)),
         asked=ASKED,
         resolution=_table(
@@ -261,6 +263,12 @@ def gap_table(paper: Published, other: Published) -> Table:
         *(f"errors, {name}" for name in names),
     )
     return Table("The same recipe under both protocols", columns, rows)
+
+
+def places_table(by_pose: Published) -> Table:
+    """Accuracy of every network by what was learned around the tested place."""
+    cases = places_cases(by_pose.results, by_pose.rows)
+    return cases_table(by_pose.results, by_pose.rows, by_pose.results.networks, cases)
 
 
 def cuts_table(authors: Published, common: Published) -> Table:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
@@ -73,6 +74,7 @@ def test_every_experiment_has_its_section(
     assert "| PointNet++ recognises every open door | 40 of 40 | yes |" in text
     assert "Of the 2 errors of all networks" in text
     assert "| dgcnn | 1.0000 | 0.99" in text, "the gap between protocols"
+    assert "| between learned directions, " in text
     assert "| pointnet | 0 | 3 of 250 |" in text, "epochs of the authors' recipe"
     for name in ("paper", "by-pose", "authors"):
         assert f"({name}: summary)" in text
@@ -117,3 +119,25 @@ def test_errors_are_told_by_what_they_have_in_common(
     results = load_results(make_comparison(simulated, wrong))
     published = pages.Published(results, rows, {}, {}, {})
     assert published.kinds_of_errors() == (3, 1, 1)
+
+
+def test_a_place_is_beyond_what_was_learned_or_between(
+    pages: ModuleType, make_comparison: MakeComparison, simulated: PreparedDataset
+) -> None:
+    import extrapolation
+
+    results = load_results(make_comparison(simulated, protocol="by-pose"))
+    at = {"close left": (20, 1.6), "left": (40, 1.6), "far right": (150, 3.0), "middle": (90, 2.0)}
+    roles = {"close left": "train", "left": "test", "far right": "train", "middle": "train"}
+    rows = {
+        name: {"sample_id": name, "robot_angle_deg": str(bearing), "distance_m": str(distance)}
+        for name, (bearing, distance) in at.items()
+    }
+
+    def cases_of_left() -> list[str]:
+        found = extrapolation.places_cases(replace(results, splits=(roles,)), rows)
+        return [case for case, belongs in found.items() if belongs(rows["left"])]
+
+    assert cases_of_left() == ["beyond them, nearer than 2.5 m"]
+    rows["middle"]["distance_m"] = "1.8"
+    assert cases_of_left() == ["between learned directions, nearer than 2.5 m"]
