@@ -15,11 +15,11 @@ SIMULATED = {
     # To train on, alone and mixed; `varied` is `varied-xtion` without noise.
     "varied": "--preset varied --scenes 1200 --seed 11",
     "varied-xtion": "--preset varied --scenes 1200 --seed 11 --sensor xtion",
-    "varied-d435": "--preset varied --scenes 600 --seed 12 --sensor d435",
-    "varied-deepdoors2": "--preset varied --scenes 300 --seed 13 --sensor deepdoors2",
-    "cluttered-kinect": "--preset cluttered --scenes 600 --seed 14 --sensor kinect",
-    "no-door-xtion": "--preset no-door --scenes 700 --seed 15 --sensor xtion",
-    "no-door-d435": "--preset no-door --scenes 500 --seed 16 --sensor d435",
+    "varied-d435": "--preset varied --scenes 1200 --seed 12 --sensor d435",
+    "varied-deepdoors2": "--preset varied --scenes 600 --seed 13 --sensor deepdoors2",
+    "cluttered-kinect": "--preset cluttered --scenes 1200 --seed 14 --sensor kinect",
+    "no-door-xtion": "--preset no-door --scenes 1000 --seed 15 --sensor xtion",
+    "no-door-d435": "--preset no-door --scenes 800 --seed 16 --sensor d435",
     # To test on: the same doors, whatever measures them.
     **{
         f"test-{name}": f"--preset varied --scenes 200 --seed 21 --sensor {sensor}"
