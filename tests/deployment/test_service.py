@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import http.client
 import io
 import json
 import os
@@ -28,7 +29,7 @@ import uvicorn
 from PIL import Image
 
 import doorstate
-from doorstate.cli.service import _listen
+from doorstate.cli.service import KEEP_ALIVE_S, _listen
 from doorstate.clouds.io import CLOUD_SUFFIXES
 from doorstate.clouds.pcd import write_pcd
 from doorstate.deployment.predictor import Predictor
@@ -71,7 +72,14 @@ def serving(gate: Any = None, **limits: Any) -> Iterator[httpx.Client]:
     """A client of the service, run by Uvicorn in a thread of this process."""
     app = create_app(Predictor(NETWORK, CARD, 256, gate=gate), Limits(**{"workers": 1} | limits))
     listening = socket.create_server(("127.0.0.1", 0))
-    config = uvicorn.Config(app, http="h11", ws="none", log_level="error", timeout_graceful_shutdown=10)
+    config = uvicorn.Config(
+        app,
+        http="h11",
+        ws="none",
+        log_level="error",
+        timeout_keep_alive=KEEP_ALIVE_S,
+        timeout_graceful_shutdown=10,
+    )
     server = uvicorn.Server(config)
     thread = threading.Thread(target=server.run, kwargs={"sockets": [listening]})
     thread.start()
@@ -367,6 +375,13 @@ def test_the_command_listens_answers_and_stops_cleanly(tmp_path: Path) -> None:
         assert line.startswith("doorstate: listening on http://127.0.0.1:")
         assert httpx.get(f"{address}/health").json()["ready"] is True
         assert httpx.post(f"{address}/predict?format=npy", content=NPY).status_code == 200
+        # An idle connection outlives the five seconds for which httpx would use it again, and Uvicorn by itself.
+        kept = http.client.HTTPConnection(address.removeprefix("http://"), timeout=10)
+        for idle_s in (0.0, 5.5):
+            time.sleep(idle_s)
+            kept.request("GET", "/health")
+            assert json.load(kept.getresponse())["ready"] is True
+        kept.close()
     finally:
         process.send_signal(signal.SIGTERM)
         out, err = process.communicate(timeout=10)

@@ -13,6 +13,10 @@ import typer
 from doorstate.cli.options import Network, PointCount, Weights
 from doorstate.errors import ConfigError, not_installed
 
+# Longer than clients (httpx: 5 s) and proxies (nginx: 60 s) keep an idle connection. If the service closes it first, a
+# request sent at that moment is lost to a reset.
+KEEP_ALIVE_S = 75
+
 
 def serve(
     host: Annotated[
@@ -69,6 +73,7 @@ def serve(
             ws="none",
             log_level="info" if verbose else "warning",
             access_log=verbose,
+            timeout_keep_alive=KEEP_ALIVE_S,
             timeout_graceful_shutdown=math.ceil(timeout_s),
         )
     )
