@@ -1,10 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The one oblique view, and the colours of points."""
+"""The one oblique view, the colours of points, and legends."""
 
 from __future__ import annotations
 
 import numpy as np
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgba
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from doorstate.evaluation.views import (
     PART_COLORS,
@@ -12,6 +16,7 @@ from doorstate.evaluation.views import (
     STATE_COLORS,
     VIEW_ELEVATION_RAD,
     oblique_view,
+    outside_legend,
     point_colors,
 )
 from doorstate.types import STATES, Part
@@ -52,3 +57,26 @@ def test_every_state_region_and_part_has_its_own_colour() -> None:
     assert set(PART_COLORS) == set(Part)
     for colors in (STATE_COLORS, REGION_COLORS, PART_COLORS):
         assert len(set(colors.values())) == len(colors)
+
+
+@pytest.mark.parametrize("width_in", [3.1, 4.2, 7.0, 13.8])
+@pytest.mark.parametrize(
+    "labels",
+    [
+        ["training", "validation", "the epoch that was kept"],
+        ["closed door", "semi-open door", "open door", "hollow: undecidable"],
+        ["as trained", "temperature scaled", "fewer than 10 answers"],
+    ],
+)
+def test_a_legend_is_no_wider_than_its_figure(width_in: float, labels: list[str]) -> None:
+    figure = Figure(figsize=(width_in, 3.0), layout="constrained")
+    figure.subplots()
+    outside_legend(figure, [Line2D([], [], marker="o") for _ in labels], labels, "outside upper right")
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    (legend,) = figure.legends
+    extent = legend.get_window_extent(canvas.get_renderer())
+    assert extent.x0 >= 0
+    assert extent.x1 <= figure.bbox.width
+    if width_in > 13:
+        assert extent.height < 40, "one line where there is room"

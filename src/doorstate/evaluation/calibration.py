@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from doorstate.evaluation.metrics import Floats, mean_and_deviation, ratio
 from doorstate.evaluation.results import ComparisonResults
 from doorstate.evaluation.table import Table, mean_deviation, number
-from doorstate.evaluation.views import graph_axes
+from doorstate.evaluation.views import graph_axes, outside_legend
 from doorstate.training.calibration import at_temperature, fit_temperature
 from doorstate.types import STATES, Indices
 
@@ -146,7 +146,7 @@ def reliability_figure(results: ComparisonResults) -> Figure | None:
         Line2D([], [], color=_INK, marker="o", linestyle="", markersize=4, fillstyle="none", alpha=0.5),
     ]
     labels = ["as trained", "temperature scaled", f"fewer than {FEWEST} answers"]
-    figure.legend(handles, labels, loc="outside upper right", ncols=3, frameon=False)
+    outside_legend(figure, handles, labels, "outside upper right")
     return figure
 
 

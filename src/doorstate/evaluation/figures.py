@@ -24,7 +24,7 @@ from doorstate.evaluation.plan_figures import error_map, poses_figure
 from doorstate.evaluation.results import ComparisonResults, Run
 from doorstate.evaluation.samples_figure import samples_figure
 from doorstate.evaluation.score_tables import answers_given, f1_intervals, fold_f1, pooled_confusion
-from doorstate.evaluation.views import STATE_WORDS, graph_axes
+from doorstate.evaluation.views import STATE_WORDS, graph_axes, outside_legend
 from doorstate.files import atomic_path
 from doorstate.types import STATES
 
@@ -148,9 +148,7 @@ def spread_figure(results: ComparisonResults, dataset: PreparedDataset) -> Figur
         Line2D([], [], color=_TRAINING, linewidth=5, alpha=0.35),
         Line2D([], [], marker="o", linestyle="", markerfacecolor="none", color=_INK),
     ]
-    figure.legend(
-        handles, ["pooled", "95 % interval", "one fold"], loc="outside upper right", ncols=3, frameon=False
-    )
+    outside_legend(figure, handles, ["pooled", "95 % interval", "one fold"], "outside upper right")
     return figure
 
 
@@ -188,7 +186,7 @@ def learning_figure(results: ComparisonResults) -> Figure:
         Line2D([], [], marker="o", linestyle="", markersize=3.5, color=_INK),
     ]
     labels = ["training", "validation", "the epoch that was kept"]
-    figure.legend(handles, labels, loc="outside upper right", ncols=3, frameon=False)
+    outside_legend(figure, handles, labels, "outside upper right")
     return figure
 
 

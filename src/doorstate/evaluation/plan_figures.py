@@ -19,7 +19,7 @@ from doorstate.dataset.strata import REGIONS
 from doorstate.evaluation.metrics import Floats
 from doorstate.evaluation.results import ComparisonResults
 from doorstate.evaluation.stratum_tables import is_undecidable
-from doorstate.evaluation.views import REGION_COLORS, STATE_COLORS, STATE_WORDS
+from doorstate.evaluation.views import REGION_COLORS, STATE_COLORS, STATE_WORDS, outside_legend
 from doorstate.simulation.generate import SampleRow
 from doorstate.simulation.manifest import unflatten
 from doorstate.simulation.scene import Door, build_scene
@@ -106,7 +106,7 @@ def error_map(results: ComparisonResults, dataset: PreparedDataset) -> Figure | 
     ]
     handles.append(Line2D([], [], linestyle="", marker="o", color="none", markeredgecolor=_INK))
     labels = [*(f"{STATE_WORDS[state]} door" for state in STATES), "hollow: undecidable"]
-    figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False)
+    outside_legend(figure, handles, labels, "outside lower center")
     return figure
 
 

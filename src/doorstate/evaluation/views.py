@@ -14,7 +14,11 @@ from numpy.typing import NDArray
 from doorstate.types import NO_ANSWER, Part, Points
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 # Okabe & Ito's colour-blind-safe set, with a deeper red so that the paper's region names fit what is seen.
 REGION_COLORS = {
@@ -54,6 +58,29 @@ PART_COLORS = {
 
 # The eye is right behind the camera, so that left and right are as in its picture, and above it.
 VIEW_ELEVATION_RAD = math.radians(25.0)
+
+
+# Of a legend's column in matplotlib's default font size: a letter, and the mark with its margins.
+_LETTER_IN, _MARK_IN = 0.076, 0.67
+
+
+def outside_legend(
+    figure: Figure,
+    handles: Sequence[Artist],
+    labels: Sequence[str],
+    place: Literal["outside upper right", "outside lower center"],
+) -> None:
+    """A legend outside the axes, in as many columns as the figure has room for: that of one network is narrow.
+
+    Args:
+        figure: with constrained layout.
+        handles: one for each label.
+        labels: in default font size.
+        place: as matplotlib calls it.
+    """
+    column_in = _LETTER_IN * max(map(len, labels)) + _MARK_IN
+    columns = min(len(labels), max(1, int(figure.get_figwidth() / column_in)))
+    figure.legend(list(handles), list(labels), loc=place, ncols=columns, frameon=False)
 
 
 def oblique_view(points: Points) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
