@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
@@ -18,23 +18,21 @@ from .conftest import MakeComparison
 
 
 @pytest.fixture
-def study(
-    simulated: PreparedDataset, make_comparison: MakeComparison, tmp_path: Path
-) -> Callable[[str, int], Path]:
+def study(simulated: PreparedDataset, make_comparison: MakeComparison, tmp_path: Path) -> Callable[..., Path]:
     """Add a part of the study in which so many open doors are called closed."""
     opened = [row["sample_id"] for row in simulated.rows if row["state"] == "open"]
 
-    def add(name: str, errors: int) -> Path:
+    def add(name: str, errors: int, missing: Sequence[tuple[str, int]] = ()) -> Path:
         wrong = {"pointnet": dict.fromkeys(opened[:errors], "closed")}
         folder = tmp_path / "study" / name
         folder.parent.mkdir(exist_ok=True)
-        make_comparison(simulated, wrong, ("pointnet",)).rename(folder)
+        make_comparison(simulated, wrong, ("pointnet",), missing).rename(folder)
         return folder.parent
 
     return add
 
 
-def test_each_kind_of_weights_has_its_column(study: Callable[[str, int], Path], tmp_path: Path) -> None:
+def test_each_kind_of_weights_has_its_column(study: Callable[..., Path], tmp_path: Path) -> None:
     study("as-trained-128", 4)
     folder = study("as-trained-256", 0)
     table = resolution_table(load_resolution(folder))
@@ -60,3 +58,9 @@ def test_each_kind_of_weights_has_its_column(study: Callable[[str, int], Path], 
 def test_a_study_without_a_finished_part_is_refused(tmp_path: Path) -> None:
     with pytest.raises(RunError, match="holds no finished part"):
         load_resolution(tmp_path)
+
+
+def test_a_part_counts_once_all_its_folds_are_there(study: Callable[..., Path]) -> None:
+    study("as-trained-128", 0)
+    folder = study("fine-tuned-128", 4, [("pointnet", 4)])
+    assert load_resolution(folder).fine_tuned == {}

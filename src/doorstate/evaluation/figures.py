@@ -181,6 +181,7 @@ def learning_figure(results: ComparisonResults) -> Figure:
                 )
     grid[0, 0].set_ylabel("loss")
     grid[1, 0].set_ylabel("1 − macro F1")
+    grid[1, 0].set_ylim(bottom=-0.001)  # room for a dot at 0, not for less than nothing
     handles = [
         *(Line2D([], [], color=color) for color in (_TRAINING, _VALIDATION)),
         Line2D([], [], marker="o", linestyle="", markersize=3.5, color=_INK),

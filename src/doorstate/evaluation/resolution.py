@@ -40,7 +40,7 @@ class ResolutionResults:
 
 
 def load_resolution(folder: Path, dataset_folder: Path | None = None) -> ResolutionResults:
-    """Read the folders of a study; what is not there yet is left out.
+    """Read the folders of a study; what is not there yet, on all folds, is left out.
 
     Raises:
         RunError: nothing is there, or a comparison cannot be used.
@@ -53,6 +53,8 @@ def load_resolution(folder: Path, dataset_folder: Path | None = None) -> Resolut
             continue
         results = load_results(path.parent, dataset_folder)
         for network in results.networks:
+            if len(results.runs_of(network)) < results.comparison.folds:
+                continue  # other folds are another question
             networks[network] = None
             macro = scores(pooled_confusion(results, network)).macro
             found[kind][network, int(points)] = float(macro.f1)

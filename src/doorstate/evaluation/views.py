@@ -61,7 +61,7 @@ VIEW_ELEVATION_RAD = math.radians(25.0)
 
 
 # Of a legend's column in matplotlib's default font size: a letter, and the mark with its margins.
-_LETTER_IN, _MARK_IN = 0.076, 0.67
+_LETTER_IN, _MARK_IN = 0.076, 0.62
 
 
 def outside_legend(
