@@ -52,9 +52,10 @@ def load_resolution(folder: Path, dataset_folder: Path | None = None) -> Resolut
         if kind not in found or not any(path.parent.glob("runs/*/*/predictions.csv")):
             continue
         results = load_results(path.parent, dataset_folder)
+        partial = {network for network, _ in results.missing}  # on other folds: another question
         for network in results.networks:
-            if len(results.runs_of(network)) < results.comparison.folds:
-                continue  # other folds are another question
+            if network in partial:
+                continue
             networks[network] = None
             macro = scores(pooled_confusion(results, network)).macro
             found[kind][network, int(points)] = float(macro.f1)

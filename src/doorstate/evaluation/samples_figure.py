@@ -19,6 +19,7 @@ from doorstate.evaluation.views import (
     REGION_COLORS,
     STATE_WORDS,
     oblique_view,
+    outside_legend,
     picture_axes,
     point_colors,
 )
@@ -125,4 +126,4 @@ def part_legend(figure: Figure, dataset: PreparedDataset, indices: Iterable[int]
     if seen:
         handles = [Line2D([], [], marker="o", linestyle="", color=PART_COLORS[Part(part)]) for part in seen]
         names = [Part(part).name.lower() for part in seen]
-        figure.legend(handles, names, loc="outside lower center", ncols=len(seen), frameon=False)
+        outside_legend(figure, handles, names, "outside lower center")
