@@ -218,7 +218,7 @@ def onnx(
     from benchmarks.onnx import measure, onnx_table
     from doorstate.console import progress_bar
     from doorstate.deployment.comparison_clouds import comparison_clouds
-    from doorstate.training.comparison import run_of
+    from doorstate.training.run_folder import run_of
 
     with progress_bar("Simulating clouds to compare on") as progress:
         compared_on = comparison_clouds(clouds, points, progress)

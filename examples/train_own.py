@@ -17,7 +17,8 @@ from doorstate.cli.training import compare_live
 from doorstate.clouds.io import find_clouds
 from doorstate.console import progress_bar
 from doorstate.dataset.prepare import Preparation, prepare_dataset
-from doorstate.training.comparison import load_experiment, run_of
+from doorstate.training.comparison import load_experiment
+from doorstate.training.run_folder import run_of
 
 
 def main() -> None:

@@ -37,8 +37,7 @@ from doorstate.evaluation.score_tables import pooled_confusion
 from doorstate.evaluation.table import Table
 from doorstate.files import write_text
 from doorstate.training.calibration import abstain_threshold, at_temperature
-from doorstate.training.comparison import run_of
-from doorstate.training.run_folder import read_json
+from doorstate.training.run_folder import read_json, run_of
 from doorstate.training.weights import load_weights, save_weights
 from doorstate.types import STATES
 

@@ -22,6 +22,11 @@ from doorstate_command import REPOSITORY, doorstate
 from published import publish, rows_of
 from studies import read_asked, write_study
 
+from doorstate.dataset.store import open_dataset
+from doorstate.evaluation.figures import Drawing, draw_dataset
+from doorstate.evaluation.report import write_everything
+from doorstate.jobs import default_workers
+
 RESULTS, RUNS, EXPERIMENTS = REPOSITORY / "results", REPOSITORY / "runs", REPOSITORY / "experiments"
 PAGES = tuple(Path("docs") / name for name in ("results.md", "related.md", "worlds.md"))
 BESIDE = {"related": "paper"}  # is shown beside the methods of another comparison
@@ -65,10 +70,9 @@ def again(network: str, fold: int, name: str = "paper") -> str | None:
     less than two samples: another machine rounds differently and so trains other weights.
     """
     from doorstate.console import live_runs
-    from doorstate.dataset.store import open_dataset
     from doorstate.evaluation.metrics import mean_and_deviation
-    from doorstate.training.comparison import Run, load_experiment, run_of, train_one
-    from doorstate.training.run_folder import RunFolder
+    from doorstate.training.comparison import Run, load_experiment, train_one
+    from doorstate.training.run_folder import RunFolder, run_of
 
     experiment = load_experiment(EXPERIMENTS / f"{name}.toml", {})
     published = [run_of(RESULTS / name, network, each) for each in range(experiment.folds)]
@@ -101,16 +105,23 @@ def build(root: Path) -> None:
     from results_page import write_pages
     from worlds_page import write_worlds_page
 
-    from doorstate.jobs import default_workers
-
     # spawn: a forked child of a process that runs BLAS threads can hang.
     with ProcessPoolExecutor(default_workers(), multiprocessing.get_context("spawn")) as pool:
         longest_first = sorted(_comparisons(), key=lambda each: len(each[0]) * each[1], reverse=True)
-        for report in [pool.submit(_report, root, *each) for each in longest_first]:
-            report.result()
-    for asked in map(read_asked, sorted(EXPERIMENTS.glob("*.toml"))):
-        if asked.command != "compare" and (RESULTS / asked.name).is_dir():
-            write_study(asked, RESULTS, root / "results" / asked.name / "report")
+        datasets = {rows_of(folders[-1], RESULTS) for folders, _ in longest_first}
+        drawn = {dataset: pool.submit(_draw_dataset, dataset) for dataset in sorted(datasets)}
+        waiting = [
+            pool.submit(write_study, asked, RESULTS, root / "results" / asked.name / "report")
+            for asked in map(read_asked, sorted(EXPERIMENTS.glob("*.toml")))
+            if asked.command != "compare" and (RESULTS / asked.name).is_dir()
+        ]
+        for folders, folds in longest_first:
+            dataset = rows_of(folders[-1], RESULTS)
+            out = root / "results" / folders[-1].name / "report"
+            of_dataset = drawn[dataset].result()
+            waiting.append(pool.submit(write_everything, folders, out, dataset, folds, of_dataset))
+        for each in waiting:
+            each.result()
     results_page, related_page, worlds_page = (root / page for page in PAGES)
     write_pages(RESULTS, root / "results", results_page, related_page)
     write_worlds_page(RESULTS, root / "results", worlds_page)
@@ -141,11 +152,8 @@ def check() -> str | None:
     return None
 
 
-def _report(root: Path, folders: list[Path], folds: int) -> None:
-    from doorstate.evaluation.report import write_everything
-
-    out = root / "results" / folders[-1].name / "report"
-    write_everything(folders, out, rows_of(folders[-1], RESULTS), folds)
+def _draw_dataset(folder: Path) -> dict[str, Drawing]:
+    return draw_dataset(open_dataset(folder))
 
 
 def _comparisons() -> Iterator[tuple[list[Path], int]]:

@@ -26,9 +26,8 @@ from doorstate.evaluation.results import ComparisonResults
 from doorstate.evaluation.score_tables import pooled_confusion
 from doorstate.evaluation.table import UNDEFINED, Table, number
 from doorstate.files import write_text
-from doorstate.training.comparison import run_of
 from doorstate.training.recipes import AUTHORS
-from doorstate.training.run_folder import read_json
+from doorstate.training.run_folder import read_json, run_of
 from doorstate.types import STATES
 
 # What the page is about, or costs beside it.

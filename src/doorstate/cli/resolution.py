@@ -34,9 +34,9 @@ def resolution(
         write_resolution,
     )
     from doorstate.files import write_csv
-    from doorstate.training.comparison import run_of
     from doorstate.training.environment import keep_freed_memory
-    from doorstate.training.resolution import AS_TRAINED, load_study
+    from doorstate.training.resolution import load_study
+    from doorstate.training.run_folder import AS_TRAINED, run_of
 
     settings = load_study(study)
     folder = out or Path("runs") / settings.name

@@ -11,6 +11,8 @@ from typing import NamedTuple
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
@@ -42,15 +44,17 @@ class Drawing(NamedTuple):
     svg: bytes
 
 
-def draw_figures(results: ComparisonResults, dataset: PreparedDataset) -> dict[str, Drawing]:
+def draw_figures(
+    results: ComparisonResults, dataset: PreparedDataset, of_dataset: Mapping[str, Drawing] | None = None
+) -> dict[str, Drawing]:
     """Draw every figure that the data allow, by the name of its files.
 
     Args:
         results: a checked comparison.
         dataset: the prepared data set that it was trained on.
+        of_dataset: what `draw_dataset` gave, if it is drawn already.
     """
     figures: dict[str, Figure | None] = {
-        **dataset_figures(dataset),
         "confusion": confusion_figure(results),
         "spread": spread_figure(results, dataset),
         "learning_curves": learning_figure(results),
@@ -60,23 +64,31 @@ def draw_figures(results: ComparisonResults, dataset: PreparedDataset) -> dict[s
         "errors_in_plan": error_map(results, dataset),
         "factors": factors_figure(results, dataset),
     }
-    return encode_figures(figures)
+    return {**(draw_dataset(dataset) if of_dataset is None else of_dataset), **encode_figures(figures)}
 
 
-def dataset_figures(dataset: PreparedDataset) -> dict[str, Figure | None]:
-    """Draw Figures 1 and 2, which need no results; None where the data set has no poses."""
-    return {"figure1_poses": poses_figure(dataset), "figure2_samples": samples_figure(dataset)}
+def draw_dataset(dataset: PreparedDataset) -> dict[str, Drawing]:
+    """Draw Figures 1 and 2, which need no results, as far as the data set has poses."""
+    return encode_figures(
+        {"figure1_poses": poses_figure(dataset), "figure2_samples": samples_figure(dataset)}
+    )
 
 
-def write_figures(results: ComparisonResults, dataset: PreparedDataset, folder: Path) -> dict[str, Drawing]:
+def write_figures(
+    results: ComparisonResults,
+    dataset: PreparedDataset,
+    folder: Path,
+    of_dataset: Mapping[str, Drawing] | None = None,
+) -> dict[str, Drawing]:
     """Write `<name>.png` and `<name>.svg` of every figure; the same inputs give the same bytes.
 
     Args:
         results: a checked comparison.
         dataset: the prepared data set that it was trained on.
         folder: where the files go; made if absent.
+        of_dataset: what `draw_dataset` gave, if it is drawn already.
     """
-    drawings = draw_figures(results, dataset)
+    drawings = draw_figures(results, dataset, of_dataset)
     save_drawings(drawings, folder)
     return drawings
 
@@ -99,12 +111,14 @@ def encode_figures(figures: Mapping[str, Figure | None]) -> dict[str, Drawing]:
 
 
 def _encode(figure: Figure, dpi: int) -> Drawing:
+    """Draw once for each file; `savefig` goes through every artist twice, once only to find the layout again."""
     png, svg = io.BytesIO(), io.BytesIO()
+    figure.dpi = dpi
+    FigureCanvasAgg(figure).print_png(png, metadata={"Software": None})  # type: ignore[no-untyped-call]
+    figure.set_layout_engine("none")  # it is laid out
     # Without salt and with a date, element names and metadata would differ from run to run.
     with mpl.rc_context({"svg.hashsalt": "doorstate"}):
-        figure.savefig(png, format="png", dpi=dpi, metadata={"Software": None})
-        figure.set_layout_engine("none")  # once is enough, and is a fifth of the work
-        figure.savefig(svg, format="svg", dpi=dpi, metadata={"Date": None, "Creator": None})
+        FigureCanvasSVG(figure).print_svg(svg, metadata={"Date": None, "Creator": None})  # type: ignore[no-untyped-call]
     return Drawing(png.getvalue(), svg.getvalue())
 
 

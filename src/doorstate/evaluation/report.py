@@ -13,8 +13,7 @@ import numpy as np
 from doorstate.dataset.store import PreparedDataset, open_dataset
 from doorstate.evaluation.figures import (
     Drawing,
-    dataset_figures,
-    encode_figures,
+    draw_dataset,
     save_drawings,
     write_figures,
 )
@@ -37,6 +36,7 @@ def write_everything(
     out_folder: Path,
     dataset_folder: Path | None = None,
     folds: int | None = None,
+    of_dataset: Mapping[str, Drawing] | None = None,
 ) -> Path:
     """Write `tables/`, `figures/` and `report.html`; the same inputs give the same bytes.
 
@@ -45,6 +45,7 @@ def write_everything(
         out_folder: made if absent.
         dataset_folder: its data set, if it is not where the comparison says.
         folds: show the first so many folds only.
+        of_dataset: what `draw_dataset` gave, if it is drawn already.
 
     Returns:
         The report.
@@ -56,7 +57,7 @@ def write_everything(
     results = load_joined(comparison_folders, dataset_folder, folds)
     dataset = open_dataset(results.dataset_folder)
     tables = write_tables(results, dataset, out_folder / "tables")
-    drawings = write_figures(results, dataset, out_folder / "figures")
+    drawings = write_figures(results, dataset, out_folder / "figures", of_dataset)
     report = out_folder / "report.html"
     write_text(report, render_report(results, dataset, tables, drawings))
     return report
@@ -77,7 +78,7 @@ def write_dataset_figures(dataset_folder: Path, out_folder: Path) -> Path:
     """
     dataset = open_dataset(dataset_folder)
     save_tables(dataset_tables(dataset), out_folder / "tables")
-    save_drawings(encode_figures(dataset_figures(dataset)), out_folder / "figures")
+    save_drawings(draw_dataset(dataset), out_folder / "figures")
     return out_folder
 
 

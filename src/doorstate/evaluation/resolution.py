@@ -17,7 +17,7 @@ from doorstate.evaluation.table import Table, number
 from doorstate.evaluation.tables import save_tables
 from doorstate.evaluation.views import NETWORK_COLORS, graph_axes
 from doorstate.files import read_csv
-from doorstate.training.resolution import AS_TRAINED, FINE_TUNED
+from doorstate.training.run_folder import AS_TRAINED, FINE_TUNED
 
 LATENCY = "latency.csv"
 _NAN = float("nan")

@@ -21,8 +21,7 @@ from doorstate.evaluation.found_shapes import Found, read_found
 from doorstate.evaluation.metrics import Floats
 from doorstate.files import read_csv
 from doorstate.rules.base import Shape
-from doorstate.training.comparison import run_of
-from doorstate.training.run_folder import RunFolder, read_json
+from doorstate.training.run_folder import RunFolder, read_json, run_of
 from doorstate.types import ANSWERS, NO_DOOR, STATES, Indices
 
 PROBABILITY_COLUMNS = tuple(f"p_{state}" for state in STATES)

@@ -31,7 +31,7 @@ from doorstate.rules import create_rule
 from doorstate.training.fit import RunConfig, fit, threads
 from doorstate.training.recipes import Recipe, find_recipe
 from doorstate.training.rule_run import RuleRunConfig, answer
-from doorstate.training.run_folder import RunFolder, check_same, write_json
+from doorstate.training.run_folder import RunFolder, check_same, run_of, write_json
 from doorstate.types import PARTS
 
 M = TypeVar("M", bound=Frozen)
@@ -166,11 +166,6 @@ def runs_of(experiment: Experiment, folder: Path) -> list[Run]:
         for fold in range(experiment.folds)
         for network in experiment.methods
     ]
-
-
-def run_of(folder: Path, network: str, fold: int) -> RunFolder:
-    """Where the run of a network or rule on one fold lies in a comparison's folder."""
-    return RunFolder(folder / "runs" / network / f"fold{fold}")
 
 
 def compare(

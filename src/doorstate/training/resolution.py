@@ -13,8 +13,7 @@ from doorstate.clouds.preparation import MIN_POINTS
 from doorstate.models import Frozen
 from doorstate.networks import list_networks
 from doorstate.training.comparison import Experiment, read_study
-
-AS_TRAINED, FINE_TUNED = "as-trained", "fine-tuned"
+from doorstate.training.run_folder import AS_TRAINED, FINE_TUNED
 
 
 class ResolutionStudy(Frozen):

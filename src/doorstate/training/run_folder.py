@@ -14,6 +14,8 @@ from doorstate.errors import RunError
 from doorstate.files import read_csv, write_csv, write_text
 from doorstate.types import STATES
 
+AS_TRAINED, FINE_TUNED = "as-trained", "fine-tuned"  # parts of a resolution study: folders AS_TRAINED-POINTS
+
 _SINCE: dict[str, Any] = {"heads": [], "rules": []}  # of settings: what older folders do not know
 
 
@@ -80,6 +82,11 @@ class RunFolder:
         write_json(self.metrics, metrics)
         self.checkpoint.unlink(missing_ok=True)
         self.position.unlink(missing_ok=True)
+
+
+def run_of(folder: Path, network: str, fold: int) -> RunFolder:
+    """Where the run of a network or rule on one fold lies in a comparison's folder."""
+    return RunFolder(folder / "runs" / network / f"fold{fold}")
 
 
 def check_same(path: Path, settings: Mapping[str, Any], what: str) -> None:
