@@ -99,6 +99,17 @@ def test_errors_are_those_that_were_put_in(
     assert row["opening width: mean error, m"] == "0.020"
     assert row["passable width: mean error, m"] == "0.050"
     assert row["hinge side"] == f"{18 / 24:.4f}"
+    given = results.answers("pointnet2")
+    assert given is not None
+    rows = [scene_dataset.rows[scene_dataset.index_of(name)] for name in given.sample_ids]
+    ajar = [
+        (row["hinge"] == "left") == (p > 0.5)
+        for row, p in zip(rows, given.columns["p_hinge_left"], strict=True)
+        if row["state"] in ("semi_open", "open")
+    ]
+    assert len(ajar) == 16
+    assert row["of doors not closed"] == f"{sum(ajar) / 16:.4f}"
+    assert 0 < sum(ajar) < 16
     assert float(row["door, AUROC"]) == 1  # 0.9 beats 0.8: a threshold between them tells all apart
 
 
