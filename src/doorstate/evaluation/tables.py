@@ -54,7 +54,7 @@ def build_tables(results: ComparisonResults, dataset: PreparedDataset) -> dict[s
             for ordinal, state in enumerate(STATES, start=4)
         },
         "folds": folds_table(results),
-        "paired_tests": paired_table(results),
+        **_filled({"paired_tests": paired_table(results)}),
         "calibration": calibration_table(results),
         "undecidable_accuracy": decidable_table(results, dataset),
         "runs": runs_table(results),
@@ -76,7 +76,7 @@ def build_tables(results: ComparisonResults, dataset: PreparedDataset) -> dict[s
 
 
 def _filled(tables: Mapping[str, Table]) -> dict[str, Table]:
-    """Leave out the tables of what only rules or only the simulator know, where there is none."""
+    """Leave out tables of nothing: of what only rules or only the simulator know, of pairs of one network."""
     return {name: table for name, table in tables.items() if table.rows}
 
 
