@@ -25,9 +25,8 @@ Points = Annotated[str, typer.Option(help="Points per cloud, separated by commas
 Batch = Annotated[int, typer.Option(help="Clouds of a training step.", min=2)]
 Repeats = Annotated[int, typer.Option(help="Rounds in which everything takes turns.", min=1)]
 Threads = Annotated[int, typer.Option(help="Threads of every measurement.", min=1)]
-Simulated = Annotated[Path, typer.Option("--data", help="A prepared data set, simulated.")]
 Packaged = Annotated[str, typer.Option(help="Whose packaged weights.")]
-TestClouds = Annotated[int, typer.Option("--count", help="Test clouds, drawn at random.", min=1)]
+Doors = Annotated[int, typer.Option("--count", help="Simulated doors, in all states.", min=1)]
 Fold = Annotated[int, typer.Option(help="Of protocol paper.", min=0, max=4)]
 _ALL_POINTS = "1024,2048,4096"
 
@@ -189,20 +188,17 @@ def knn(out: Out, points: Points = _ALL_POINTS, repeats: Repeats = 5, threads: T
 @app.command()
 def thinning(
     out: Out,
-    data: Simulated,
     network: Packaged = "pointnet2",
-    count: TestClouds = 300,
-    fold: Fold = 0,
+    count: Doors = 300,
 ) -> None:
     """Whether sampling some pixels, as a robot does, gives the answers of sampling all, as in training."""
     from benchmarks.thinning import measure, thinning_table
     from doorstate.console import progress_bar
-    from doorstate.dataset.store import open_dataset
 
     with progress_bar("thinning") as progress:
-        rows = measure(open_dataset(data), network, count, fold, progress)
+        rows = measure(network, count, progress)
     table = thinning_table(rows)
-    _finish(out, "thinning", rows, table, network=network, fold=fold, data=str(data))
+    _finish(out, "thinning", rows, table, network=network)
 
 
 @app.command()
@@ -232,20 +228,17 @@ def onnx(
 @app.command()
 def gate(
     out: Out,
-    data: Simulated,
     network: Packaged = "pointnet2",
-    count: TestClouds = 100,
-    fold: Fold = 0,
+    count: Doors = 100,
 ) -> None:
     """What the gate refuses, and what becomes "open" with and without it, when data go missing."""
     from benchmarks.gate import gate_table, measure
     from doorstate.console import progress_bar
-    from doorstate.dataset.store import open_dataset
 
     with progress_bar("gate") as progress:
-        rows = measure(open_dataset(data), network, count, fold, progress)
+        rows = measure(network, count, progress)
     table = gate_table(rows)
-    _finish(out, "gate", rows, table, network=network, fold=fold, data=str(data))
+    _finish(out, "gate", rows, table, network=network)
 
 
 @app.command()

@@ -9,14 +9,12 @@ from pathlib import Path
 import numpy as np
 
 from doorstate.clouds.preparation import normalize
-from doorstate.dataset.splits import draw_splits
-from doorstate.dataset.store import PreparedDataset, open_dataset
+from doorstate.dataset.store import open_dataset
 from doorstate.deployment.comparison_clouds import LabelledClouds, comparison_clouds, comparison_doors
 from doorstate.errors import ConfigError
 from doorstate.jobs import Progress
 from doorstate.simulation.frames import Frame, replay
-from doorstate.simulation.generate import PRESETS, draw_pose, pose_indices
-from doorstate.simulation.manifest import unflatten
+from doorstate.simulation.generate import PRESETS, SampleRow, draw_pose, pose_indices
 from doorstate.types import Points
 
 
@@ -64,14 +62,9 @@ def dataset_clouds(folder: Path, count: int, num_points: int) -> Clouds:
     return Clouds(np.array(dataset.clouds[chosen, :num_points]), dataset.labels[chosen])
 
 
-def tested_frames(
-    dataset: PreparedDataset, count: int, fold: int, progress: Progress
-) -> Iterator[tuple[int, dict[str, str], Frame]]:
-    """Number, row and frame, rendered anew, of samples that a fold of protocol paper tests, drawn at random."""
-    roles = draw_splits(dataset.rows, "paper", 0)[fold]
-    tested = [row for row in dataset.rows if roles[row["sample_id"]] == "test"]
-    chosen = np.random.default_rng(0).permutation(len(tested))[:count]
-    for done, index in enumerate(chosen):
-        progress(done, len(chosen))
-        yield int(index), tested[index], replay(unflatten(tested[index]))
-    progress(len(chosen), len(chosen))
+def comparison_frames(count: int, progress: Progress) -> Iterator[tuple[SampleRow, Frame]]:
+    """Doors that no weights were trained on, as the camera sees them."""
+    for done, row in enumerate(comparison_doors(count)):
+        progress(done, count)
+        yield row, replay(row)
+    progress(count, count)

@@ -8,18 +8,17 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.clouds import tested_frames
+from benchmarks.clouds import comparison_frames
 from benchmarks.store import Group
 from doorstate.clouds.preparation import is_measured
-from doorstate.dataset.store import PreparedDataset
 from doorstate.deployment.predictor import Predictor
 from doorstate.evaluation.table import Table
 from doorstate.jobs import Progress
 from doorstate.simulation.frames import Frame, replay
-from doorstate.simulation.manifest import unflatten
+from doorstate.simulation.generate import SampleRow
 from doorstate.types import Part, Points
 
-Fault = Callable[[dict[str, str], Frame, np.random.Generator], Points]
+Fault = Callable[[SampleRow, Frame, np.random.Generator], Points]
 
 
 def without(cloud: Points, missing: NDArray[np.bool_]) -> Points:
@@ -29,16 +28,16 @@ def without(cloud: Points, missing: NDArray[np.bool_]) -> Points:
     return cut
 
 
-def glass(row: dict[str, str], frame: Frame) -> Points:
+def glass(row: SampleRow, frame: Frame) -> Points:
     """The frame as if the leaf, and the leaf's place in its frame, gave no return."""
-    shut = replay(unflatten({**row, "opening_angle_deg": "0"}))
+    shut = replay(row.model_copy(update={"opening_angle_deg": 0.0}))
     return without(frame.points, (shut.full.part == Part.LEAF) | (frame.full.part == Part.LEAF))
 
 
 def _band(first: float, last: float, axis: int) -> Fault:
     """Loses what is between two shares of the image's height (axis 0) or width (axis 1)."""
 
-    def fault(row: dict[str, str], frame: Frame, generator: np.random.Generator) -> Points:
+    def fault(row: SampleRow, frame: Frame, generator: np.random.Generator) -> Points:
         shape = frame.points.shape[:2]
         place = np.indices(shape)[axis] / shape[axis]
         return without(frame.points, (place >= first) & (place < last))
@@ -49,7 +48,7 @@ def _band(first: float, last: float, axis: int) -> Fault:
 def _dropout(share: float, columns: bool) -> Fault:
     """Loses a share of all pixels, or of all columns."""
 
-    def fault(row: dict[str, str], frame: Frame, generator: np.random.Generator) -> Points:
+    def fault(row: SampleRow, frame: Frame, generator: np.random.Generator) -> Points:
         height, width = frame.points.shape[:2]
         lost = generator.random(width if columns else (height, width)) < share
         return without(frame.points, np.broadcast_to(lost, (height, width)))
@@ -71,19 +70,19 @@ FAULTS: dict[str, Fault] = {
 }
 
 
-def measure(dataset: PreparedDataset, network: str, count: int, fold: int, progress: Progress) -> list[Group]:
-    """Answers of packaged weights, with and without gate, on test clouds of a fold with every fault."""
+def measure(network: str, count: int, progress: Progress) -> list[Group]:
+    """Answers of packaged weights, with and without gate, on doors they were not trained on, with every fault."""
     predictor = Predictor.load(network)
     careless = Predictor(predictor.network, predictor.card, predictor.points, gate=None)
     rows = []
-    for number, row, frame in tested_frames(dataset, count, fold, progress):
+    for number, (row, frame) in enumerate(comparison_frames(count, progress)):
         for name, fault in FAULTS.items():
             cloud = fault(row, frame, np.random.default_rng(number))
             flat = cloud[is_measured(cloud)]
             rows.append(
                 {
-                    "sample_id": row["sample_id"],
-                    "state": row["state"],
+                    "sample_id": row.sample_id,
+                    "state": row.state,
                     "fault": name,
                     "gated": _told(predictor, cloud),
                     "gated_flat": _told(predictor, flat),
@@ -118,8 +117,8 @@ def gate_table(rows: Sequence[Group]) -> Table:
             "called open without the gate",
         ),
         tuple(lines),
-        "Packaged weights on test clouds of their fold, each with every fault, organized and as a flat list of what "
-        "was measured.",
+        "Packaged weights on simulated doors that they were not trained on, each with every fault, organized and as a "
+        "flat list of what was measured.",
     )
 
 

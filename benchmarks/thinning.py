@@ -7,21 +7,20 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from benchmarks.clouds import tested_frames
+from benchmarks.clouds import comparison_frames
 from benchmarks.store import Group
-from doorstate.dataset.store import PreparedDataset
 from doorstate.deployment.predictor import Prediction, Predictor
 from doorstate.evaluation.table import Table, number
 from doorstate.jobs import Progress
 
 
-def measure(dataset: PreparedDataset, network: str, count: int, fold: int, progress: Progress) -> list[Group]:
-    """Answers of packaged weights on test clouds of a fold, rendered anew, with both samplings."""
+def measure(network: str, count: int, progress: Progress) -> list[Group]:
+    """Answers of packaged weights to doors they were not trained on, with both samplings."""
     samplings = {"some": Predictor.load(network), "all": Predictor.load(network, thin=False)}
     rows = []
-    for _, row, frame in tested_frames(dataset, count, fold, progress):
+    for row, frame in comparison_frames(count, progress):
         answers = {name: predict(frame.points) for name, predict in samplings.items()}
-        rows.append({"truth": row["state"]} | {k: _told(v) for k, v in answers.items()})
+        rows.append({"truth": row.state} | {k: _told(v) for k, v in answers.items()})
     return rows
 
 
@@ -47,7 +46,8 @@ def thinning_table(rows: Sequence[Group]) -> Table:
                 number(max(apart)),
             ),
         ),
-        "Packaged weights on test clouds of their fold; differences are of the largest-differing probability.",
+        "Packaged weights on simulated doors that they were not trained on; differences are of the probability that "
+        "differs most.",
     )
 
 

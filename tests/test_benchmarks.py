@@ -306,8 +306,8 @@ def test_a_file_that_is_not_written_has_its_row() -> None:
     assert table.rows == (("dgcnn", "onnxruntime", "not written", *["–"] * 4),)
 
 
-def test_thinning_compares_answers(small_dataset: PreparedDataset, tmp_path: Path) -> None:
-    code, output, errors = run("thinning", "--data", small_dataset.folder, "--count", 3, "--out", tmp_path)
+def test_thinning_compares_answers(tmp_path: Path) -> None:
+    code, output, errors = run("thinning", "--count", 3, "--out", tmp_path)
     assert (code, errors) == (0, "")
     _, rows, markdown = stored(tmp_path, "thinning")
     assert len(rows) == 3
@@ -318,8 +318,8 @@ def test_thinning_compares_answers(small_dataset: PreparedDataset, tmp_path: Pat
     assert "Sampling from some pixels" in output
 
 
-def test_gate_counts_what_faults_do(small_dataset: PreparedDataset, tmp_path: Path) -> None:
-    code, output, errors = run("gate", "--data", small_dataset.folder, "--count", 2, "--out", tmp_path)
+def test_gate_counts_what_faults_do(tmp_path: Path) -> None:
+    code, output, errors = run("gate", "--count", 2, "--out", tmp_path)
     assert (code, errors) == (0, "")
     _, rows, _ = stored(tmp_path, "gate")
     assert len(rows) == 2 * len(FAULTS)

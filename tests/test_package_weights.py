@@ -78,6 +78,7 @@ def test_weights_are_packaged_with_a_temperature_and_a_card(
     card = read_card(package / "pointnet.safetensors")
     assert card.temperature != 1
     assert card.max_depth_m == 5
+    assert card.points == card.num_points == 128, "no study says that fewer do"
     text = (package / "pointnet.md").read_text(encoding="utf-8")
     assert "all 36 simulated clouds" in text
     assert "| augmentation | yaw deg 15.0 |" in text
@@ -124,6 +125,7 @@ def test_weights_that_were_tested_say_how_well_and_when_they_are_unsure(
     tool.main(str(runs / "mixture"), "some-")
 
     card = read_card(package / "some-pointnet.safetensors")
+    assert card.default_points == 128, "the study knows no other"
     (validation,) = load_results(runs / "mixture").runs_of("pointnet")
     assert validation.validation is not None
     scaled = at_temperature(validation.validation.probabilities, card.temperature)

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import hashlib
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from statistics import median
@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from published import rows_of
 from results_page import NAMES
-from studies import read_asked, study_table
+from studies import Asked, read_asked, resolution_results, study_table
 from templates import template
 from zoo_page import PAGE, page
 
@@ -32,6 +32,7 @@ from doorstate.evaluation.calibration import calibrate, reliability
 from doorstate.evaluation.factors import factors_table, kinds_table
 from doorstate.evaluation.head_tables import answers_table, presence_table
 from doorstate.evaluation.metrics import scores
+from doorstate.evaluation.resolution import fewest_points
 from doorstate.evaluation.results import ComparisonResults, load_results
 from doorstate.evaluation.score_tables import pooled_confusion
 from doorstate.evaluation.table import Table
@@ -45,6 +46,10 @@ REPOSITORY = Path(__file__).resolve().parents[1]
 RESULTS, EXPERIMENTS = REPOSITORY / "results", REPOSITORY / "experiments"
 WEIGHTS = REPOSITORY / "src" / "doorstate" / "deployment" / "weights"
 _MANY = 25e6  # bytes of one set of networks
+_FEWEST, _LOST = (
+    1024,
+    0.002,
+)  # default points are no fewer, and lose no more macro-F1 on samples never learned from
 _WRONG_SHARE = 0.01  # of the validation samples that are answered at all
 
 
@@ -53,6 +58,7 @@ class Evidence(NamedTuple):
 
     temperature: float
     abstain_below: float
+    default_points: int | None
     card: str  # template
     shown: dict[str, Any]  # in it
 
@@ -77,12 +83,14 @@ def main(folder: str, prefix: str = "") -> None:
         found = evidence(network_name)
         network, card = load_weights(run.weights)
         target = WEIGHTS / f"{name}.safetensors"
-        save_weights(
-            target,
-            network,
-            card.model_copy(update={"temperature": found.temperature, "abstain_below": found.abstain_below}),
-            half=True,
+        card = card.model_copy(
+            update={
+                "temperature": found.temperature,
+                "abstain_below": found.abstain_below,
+                "default_points": found.default_points,
+            }
         )
+        save_weights(target, network, card, half=True)
         metrics, recipe = run.read_metrics(), read_json(run.config)["recipe"]
         text = template(found.card).render(
             name=name,
@@ -127,8 +135,10 @@ def _of_recipe() -> Callable[[str], Evidence]:
         return Evidence(
             round(median(calibrated.temperatures), 4),
             0.0,
+            _default_points("by-pose", network),
             "ogurob_card.md.j2",
             {
+                "tables": _tables_of(network, _study_tables("by-pose")),
                 "error": reliability(calibrated.true, calibrated.scaled).error,
                 "found": [
                     {"protocol": each.comparison.protocol, **_scores(each, network)}
@@ -164,6 +174,7 @@ def _of_weights(experiment: str) -> Callable[[str], Evidence]:
         return Evidence(
             temperature,
             threshold,
+            _default_points(experiment, network),
             "worlds_card.md.j2",
             {
                 "error": reliability(calibrated.true, calibrated.scaled).error,
@@ -171,22 +182,35 @@ def _of_weights(experiment: str) -> Callable[[str], Evidence]:
                 "wrong_share": _WRONG_SHARE,
                 "answered": float(answered.mean()),
                 "right_of_answered": float(np.mean(right[answered])) if answered.any() else float("nan"),
-                "tables": [
-                    part.to_markdown().strip()
-                    for table in (*tables, *_studies(experiment))
-                    if (part := _of_network(table, network)).rows
-                ],
+                "tables": _tables_of(network, (*tables, *_study_tables(experiment))),
             },
         )
 
     return evidence
 
 
-def _studies(experiment: str) -> Iterator[Table]:
-    """What studies that are published asked of the weights of an experiment."""
+def _studies(experiment: str) -> Iterator[Asked]:
+    """Published studies of the weights of an experiment."""
     for asked in map(read_asked, sorted(EXPERIMENTS.glob("*.toml"))):
         if experiment in asked.begins_with and (RESULTS / asked.name).is_dir():
-            yield study_table(asked, RESULTS)
+            yield asked
+
+
+def _study_tables(experiment: str) -> Iterator[Table]:
+    return (study_table(asked, RESULTS) for asked in _studies(experiment))
+
+
+def _default_points(experiment: str, network: str) -> int | None:
+    """As few points as lose nothing, as the study of an experiment's weights tells; None if it tells nothing."""
+    for asked in _studies(experiment):
+        if asked.command == "resolution":
+            return fewest_points(resolution_results(asked, RESULTS), network, _FEWEST, _LOST)
+    return None
+
+
+def _tables_of(network: str, tables: Iterable[Table]) -> list[str]:
+    parts = (_of_network(table, network) for table in tables)
+    return [part.to_markdown().strip() for part in parts if part.rows]
 
 
 def _of_network(table: Table, network: str) -> Table:

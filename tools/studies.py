@@ -7,7 +7,12 @@ import tomllib
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from doorstate.evaluation.resolution import load_resolution, resolution_table, write_resolution
+from doorstate.evaluation.resolution import (
+    ResolutionResults,
+    load_resolution,
+    resolution_table,
+    write_resolution,
+)
 from doorstate.evaluation.table import Table
 from doorstate.evaluation.transfer import (
     TransferResults,
@@ -56,7 +61,12 @@ def study_table(asked: Asked, results_folder: Path) -> Table:
     """
     if asked.command == "transfer":
         return transfer_table(_transfer_results(asked, results_folder))
-    return resolution_table(load_resolution(results_folder / asked.name, _rows(asked, results_folder)))
+    return resolution_table(resolution_results(asked, results_folder))
+
+
+def resolution_results(asked: Asked, results_folder: Path) -> ResolutionResults:
+    """What is published of a study of command `resolution`."""
+    return load_resolution(results_folder / asked.name, _rows(asked, results_folder))
 
 
 def write_study(asked: Asked, results_folder: Path, out_folder: Path) -> None:

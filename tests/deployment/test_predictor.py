@@ -127,6 +127,9 @@ def test_weights_load_by_path_and_by_name(tmp_path: Path) -> None:
     save_weights(path, create_network("pointcnn"), WeightsCard(network="pointcnn", num_points=256))
     assert Predictor.load(path).points == 256
     assert Predictor.load(path, points=512).points == 512
+    fewer = WeightsCard(network="pointcnn", num_points=256, default_points=192)
+    save_weights(path, create_network("pointcnn"), fewer)
+    assert Predictor.load(path).points == 192
     with pytest.raises(WeightsError, match=r"no weights for 'nonet' in the package \(there are: .*pointnet2"):
         Predictor.load("nonet")
 

@@ -10,7 +10,14 @@ import pytest
 
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import RunError
-from doorstate.evaluation.resolution import LATENCY, load_resolution, resolution_table, write_resolution
+from doorstate.evaluation.resolution import (
+    LATENCY,
+    ResolutionResults,
+    fewest_points,
+    load_resolution,
+    resolution_table,
+    write_resolution,
+)
 from doorstate.evaluation.table import UNDEFINED
 from doorstate.files import write_csv
 
@@ -64,3 +71,21 @@ def test_a_part_counts_once_all_its_folds_are_there(study: Callable[..., Path]) 
     study("as-trained-128", 0)
     folder = study("fine-tuned-128", 4, [("pointnet", 4)])
     assert load_resolution(folder).fine_tuned == {}
+
+
+@pytest.mark.parametrize(
+    ("macro_f1", "enough"),
+    [
+        ({256: 0.90, 512: 0.90, 1024: 0.90, 4096: 0.90}, 512),
+        ({256: 0.90, 512: 0.899, 1024: 0.901, 4096: 0.90}, 512),
+        ({256: 0.90, 512: 0.80, 1024: 0.90, 4096: 0.90}, 1024),
+        ({256: 0.90, 512: 0.90, 1024: 0.80, 4096: 0.90}, 4096),
+        ({128: 0.90, 256: 0.90}, 256),
+        ({}, None),
+    ],
+)
+def test_the_fewest_points_that_lose_nothing(macro_f1: dict[int, float], enough: int | None) -> None:
+    found = {("dgcnn", points): value for points, value in macro_f1.items()}
+    results = ResolutionResults(("dgcnn",), tuple(macro_f1), found, {}, {})
+    assert fewest_points(results, "dgcnn", fewest=512, lost=0.002) == enough
+    assert fewest_points(results, "pointnet", fewest=512, lost=0.002) is None

@@ -51,7 +51,7 @@ def export(
     if card.network != network:
         raise ConfigError(f"{weights}: weights of {card.network}, not of {network}")
     with progress_bar("Simulating clouds to compare on") as progress:
-        compared_on = comparison_clouds(clouds, points or card.num_points, progress)
+        compared_on = comparison_clouds(clouds, points or card.points, progress)
     with progress_bar(f"Exporting {network}") as progress:
         found = export_onnx(path, loaded, card, compared_on, opset=opset, int8=int8, progress=progress)
     stdout.print(

@@ -129,7 +129,11 @@ def export_onnx(
                 if int8:
                     _quantize(temporary)
                     model = onnx.load(temporary)
-                metadata = {CARD: card.model_copy(update={"num_points": num_points}).model_dump_json()}
+                metadata = {
+                    CARD: card.model_copy(
+                        update={"num_points": num_points, "default_points": None}
+                    ).model_dump_json()
+                }
                 onnx.helper.set_model_props(model, _METADATA | metadata)
                 model.producer_name, model.producer_version = "doorstate", __version__
                 onnx.checker.check_model(model, full_check=True)

@@ -130,7 +130,7 @@ class Predictor:
         Args:
             name_or_path: a name of `packaged_networks()`, a `.safetensors` file, or an `.onnx` file of
                 `doorstate export`, which needs no torch.
-            points: how many points to look at; None takes as many as the weights were trained with.
+            points: how many points to look at; None takes as many as the weights ask for.
             thin: as of the class.
             gate: as of the class.
             budget_ms: in place of `points`: the most of `BUDGET_POINTS` that this machine, measured now, takes no more
@@ -155,7 +155,7 @@ class Predictor:
             return cls(network, card, count, thin=thin, gate=gate, clock=clock)
 
         if budget_ms is None:
-            return looking_at(card.num_points if points is None else points)
+            return looking_at(card.points if points is None else points)
         exported = isinstance(network, OnnxNetwork)
         counts = [] if exported else [count for count in BUDGET_POINTS if count <= card.num_points]
         counts = counts or [card.num_points]

@@ -69,6 +69,28 @@ def load_resolution(folder: Path, dataset_folder: Path | None = None) -> Resolut
     )
 
 
+def fewest_points(results: ResolutionResults, network: str, fewest: int, lost: float) -> int | None:
+    """The fewest points with which weights, as trained, do as well as with the most, and so with all between.
+
+    Args:
+        results: of a study.
+        network: name.
+        fewest: not fewer than these are looked for.
+        lost: how much less macro-F1 is as well.
+
+    Returns:
+        None if the study does not have the network.
+    """
+    counts = [points for points in results.points if (network, points) in results.as_trained]
+    enough = None
+    for points in reversed(counts):
+        if results.as_trained[network, points] < results.as_trained[network, counts[-1]] - lost:
+            break
+        if enough is None or points >= fewest:
+            enough = points
+    return enough
+
+
 def resolution_table(results: ResolutionResults) -> Table:
     """A line for each network and number of points; a column for the fine-tuned only if there are some."""
     columns = [("macro F1, as trained", results.as_trained, 4)]

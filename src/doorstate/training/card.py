@@ -16,7 +16,8 @@ class WeightsCard(Frozen):
 
     network: str
     network_options: dict[str, object] = Field(default_factory=dict)
-    num_points: int
+    num_points: int  # trained with
+    default_points: int | None = Field(default=None, gt=0)  # fewer, that lose nothing
     heads: tuple[str, ...] = ()  # answers besides the state
     scale_m: float = SCALE_M
     states: tuple[str, ...] = STATES
@@ -25,3 +26,8 @@ class WeightsCard(Frozen):
     abstain_below: float = Field(default=0.0, ge=0, lt=1)  # no state from a probability below this
     trained_on: str = ""
     doorstate_version: str = __version__
+
+    @property
+    def points(self) -> int:
+        """How many points to look at unless told otherwise."""
+        return self.default_points or self.num_points
