@@ -13,10 +13,13 @@ from doorstate.errors import ConfigError
 
 
 def export(
-    network: Annotated[str, typer.Argument(help="Network whose weights to export.")],
+    network: Annotated[
+        str, typer.Argument(help="Packaged weights to export; with --weights the network that they are of.")
+    ],
     weights: Weights = None,
     points: Annotated[
-        int | None, typer.Option(help="Points that the file takes; as trained if not given.", min=128)
+        int | None,
+        typer.Option(help="Points that the file takes; as the weights ask for if not given.", min=128),
     ] = None,
     out: Annotated[Path | None, typer.Option(help="File to write; NETWORK.onnx if not given.")] = None,
     opset: Annotated[int, typer.Option(help="Version of ONNX's operators.", min=18)] = 18,
@@ -39,16 +42,14 @@ def export(
     from doorstate.deployment.comparison_clouds import comparison_clouds
     from doorstate.deployment.onnx_export import TOLERANCE, check_installed, export_onnx
     from doorstate.deployment.predictor import packaged_weights
-    from doorstate.networks import network_class
     from doorstate.training.weights import load_weights
 
     path = out or Path(f"{network}{'-int8' if int8 else ''}.onnx")
     if path.suffix != ".onnx":
         raise ConfigError(f"--out {path}: predict knows exported files by the ending .onnx")
-    network_class(network)  # or an error that names those there are
     check_installed()
     loaded, card = load_weights(weights or packaged_weights(network))
-    if card.network != network:
+    if weights is not None and card.network != network:
         raise ConfigError(f"{weights}: weights of {card.network}, not of {network}")
     with progress_bar("Simulating clouds to compare on") as progress:
         compared_on = comparison_clouds(clouds, points or card.points, progress)

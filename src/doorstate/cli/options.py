@@ -42,7 +42,9 @@ Weights = Annotated[Path | None, typer.Option(help="A weights file of your own, 
 RuleName = Annotated[
     str | None, typer.Option(help="Answer by this rule instead of a network: doorstate info lists them.")
 ]
-PointCount = Annotated[int | None, typer.Option(help="Points to look at; as trained if not given.", min=128)]
+PointCount = Annotated[
+    int | None, typer.Option(help="Points to look at; as the weights ask for if not given.", min=128)
+]
 Bag = Annotated[
     Path | None, typer.Option(help="A ROS recording in place of files: .bag, .db3, .mcap, or ROS 2 folder.")
 ]
