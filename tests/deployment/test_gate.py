@@ -116,7 +116,7 @@ def test_simulated_doors_pass_and_glass_doors_do_not(small_dataset: PreparedData
         frame = replay(unflatten(row))
         assert gate(frame.points) is None
         assert gate(frame.points.reshape(-1, 3)) is None
-        refused_glass += gate(glass(row, frame)) is not None
+        refused_glass += gate(glass(unflatten(row), frame)) is not None
     assert refused_glass >= len(rows) - 1
 
 
@@ -150,7 +150,7 @@ def test_a_door_that_is_not_open_never_becomes_open_by_losing_data(small_dataset
     for number, sample in enumerate(shut[::5]):
         frame = replay(unflatten(sample))
         for fault in FAULTS.values():
-            cloud = fault(sample, frame, np.random.default_rng(number))
+            cloud = fault(unflatten(sample), frame, np.random.default_rng(number))
             answer = predictor(cloud)
             assert answer.state is None or answer.state.label != "open"
             assert (answer.state is None) == bool(answer.reason)
