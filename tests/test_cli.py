@@ -130,9 +130,9 @@ def test_predict_by_a_rule_needs_no_weights_and_may_say_why_not(
     assert code == 0
     assert "none: " in out, "this rule tells open doors only, from images only"
     code, _, err = run("predict", "--rule", "open_door", "--points", 128, cloud)
-    assert code == 1
-    assert "leave weights, points and time budget out" in err
-    assert run("predict", "--rule", "nonsense", cloud)[0] == 1
+    assert code == 2
+    assert "leave points and time budget out" in err
+    assert run("predict", "--rule", "nonsense", cloud)[0] == 2
 
 
 def test_predict_json_is_one_object_a_line(
@@ -176,7 +176,12 @@ def broken(kind: str, cloud: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize(
     ("kind", "complaint"),
-    [("empty", "empty"), ("all NaN", "NaN"), ("too few", "too few points"), ("millimetres", "millimetres?")],
+    [
+        ("empty", "empty"),
+        ("all NaN", "NaN"),
+        ("too few", "too few points"),
+        ("millimetres", "1000 times too far"),
+    ],
 )
 def test_a_cloud_without_a_door_to_see_is_one_line(
     kind: str, complaint: str, run: Run, weights: Path, cloud: np.ndarray, tmp_path: Path
@@ -227,27 +232,38 @@ def test_depth_images_need_and_take_a_camera(run: Run, weights: Path, tmp_path: 
 
 
 @pytest.mark.parametrize(
-    ("arguments", "complaint"),
+    ("arguments", "complaint", "exit_code"),
     [
-        (["predict", "gone.pcd"], "gone.pcd"),
-        (["predict", ".", "--units", "furlongs"], "--units furlongs"),
-        (["predict", ".", "--frame", "sideways"], "sideways"),
-        (["predict", ".", "--network", "pointnett"], "pointnett"),
-        (["predict", ".", "--weights", "gone.safetensors"], "no such weights file"),
-        (["simulate", "--out", "x", "--preset", "mars"], "no preset 'mars'"),
-        (["simulate", "--out", "x", "--poses", "9999"], "1353"),
-        (["simulate", "--out", "x", "--keep", "video"], "pcd, depth, image"),
-        (["prepare", "gone", "--out", "x"], "gone"),
-        (["train", "pointnet", "--data", "gone", "--out", "x"], "gone"),
-        (["train", "poinnet", "--data", "gone", "--out", "x"], "did you mean 'pointnet'"),
-        (["compare", "gone.toml"], "gone.toml"),
-        (["compare", "--data", "gone", "--set", "epochs"], "FIELD=VALUE"),
-        (["report", "gone"], "gone"),
+        (["predict", "gone.pcd"], "gone.pcd", 1),
+        (["predict", ".", "--roll", "45"], "a roll of 45 degrees", 2),
+        (["predict", ".", "--fx", "-5", "--fy", "5", "--cx", "2", "--cy", "2"], "fx = -5.0 pixels", 2),
+        (["predict", ".", "--rule", "plane_state", "--network", "dgcnn"], "one answers", 2),
+        (["predict", ".", "--network", "dgcnn", "--weights", "x.safetensors"], "one answers", 2),
+        (["predict", ".", "--rule", "plane_state", "--points", "1024"], "a rule looks at all points", 2),
+        (["predict", ".", "--out", "cloud.npy/x.csv"], "cloud.npy/x.csv: cannot be written", 1),
+        (["predict", ".", "--out", "states.txt"], "name a .csv or .jsonl file", 2),
+        (["view", ".", "--out", "cloud.npy/x.html"], "cloud.npy/x.html: cannot be written", 1),
+        (["export", "pointnet", "--out", "cloud.npy/x.onnx"], "cloud.npy/x.onnx: cannot be written", 1),
+        (["simulate", "--out", "x", "--poses", "0"], "--poses 0", 2),
+        (["predict", ".", "--units", "furlongs"], "--units furlongs", 2),
+        (["predict", ".", "--frame", "sideways"], "sideways", 2),
+        (["predict", ".", "--network", "pointnett"], "pointnett", 1),
+        (["predict", ".", "--weights", "gone.safetensors"], "no such weights file", 1),
+        (["simulate", "--out", "x", "--preset", "mars"], "no preset 'mars'", 2),
+        (["simulate", "--out", "x", "--poses", "9999"], "1353", 2),
+        (["simulate", "--out", "x", "--keep", "video"], "pcd, depth, image", 2),
+        (["prepare", "gone", "--out", "x"], "gone", 1),
+        (["train", "pointnet", "--data", "gone", "--out", "x"], "gone", 1),
+        (["train", "poinnet", "--data", "gone", "--out", "x"], "did you mean 'pointnet'", 2),
+        (["compare", "gone.toml"], "gone.toml", 2),
+        (["compare", "--data", "gone", "--set", "epochs"], "FIELD=VALUE", 2),
+        (["report", "gone"], "gone", 1),
     ],
 )
-def test_errors_are_one_line_and_exit_code_1(
+def test_errors_are_one_line_and_wrong_usage_is_exit_code_2(
     arguments: list[str],
     complaint: str,
+    exit_code: int,
     run: Run,
     tmp_path: Path,
     cloud: np.ndarray,
@@ -256,10 +272,11 @@ def test_errors_are_one_line_and_exit_code_1(
     monkeypatch.chdir(tmp_path)
     np.save("cloud.npy", cloud)
     code, _, err = run(*arguments)
-    assert code == 1
+    assert code == exit_code
     assert len(err.strip().splitlines()) == 1
     assert err.startswith("doorstate: ")
     assert complaint in err
+    assert not Path("x").exists(), "what was refused is in nobody's way"
 
 
 def test_a_stop_by_the_user_is_exit_code_130(

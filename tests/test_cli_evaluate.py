@@ -144,13 +144,17 @@ def test_folders_of_states_are_enough_and_the_same_files_come_out_twice(
         (("--network", "nobody"), "no weights for 'nobody'"),
         (("--layout", "kitti"), "no layout 'kitti'"),
         (("--layout", "deepdoors2", "--roll", "90"), "--layout says how its files are read"),
+        (("--all",), "--all is for the page of --out"),
+        (("--rule", "plane_state", "--points", "512"), "a rule looks at all points"),
+        (("--out", "index.csv/report"), "index.csv/report/frames.html: cannot be written"),
     ],
 )
 def test_what_cannot_be_done_is_said_in_one_line(
     arguments: tuple[str, ...], message: str, recordings: Path, run: Run
 ) -> None:
+    arguments = tuple(str(recordings / word) if word.startswith("index.csv") else word for word in arguments)
     code, out, err = run("evaluate", recordings, *arguments)
-    assert (code, out) == (1, "")
+    assert (code, out) == (1 if "nobody" in arguments or "--out" in arguments else 2, "")
     assert message in err
     assert err.count("\n") == 1
 

@@ -3,13 +3,15 @@
 
 from __future__ import annotations
 
+import errno
+import os
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from doorstate.errors import DatasetError
-from doorstate.files import atomic_path, is_vacant, read_csv, write_csv, write_text
+from doorstate.errors import DatasetError, OutputError
+from doorstate.files import atomic_path, check_writable, is_vacant, read_csv, write_csv, write_text
 
 
 def test_the_target_appears_when_the_block_ends(tmp_path: Path) -> None:
@@ -46,6 +48,23 @@ def test_a_block_that_writes_nothing_is_an_error_and_keeps_the_old_file(tmp_path
     with pytest.raises(FileNotFoundError), atomic_path(target):
         pass
     assert target.read_text(encoding="utf-8") == "old"
+
+
+def test_where_nothing_can_be_written_is_one_line_before_and_when_it_is_tried(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    for target in (tmp_path / "file" / "page.html", tmp_path):
+        with pytest.raises(OutputError, match="cannot be written"):
+            check_writable(target)
+        with pytest.raises(OutputError, match="cannot be written"):
+            write_text(target, "text")
+
+
+def test_a_full_disk_is_one_line_and_another_missing_file_is_itself(tmp_path: Path) -> None:
+    refused = pytest.raises(OutputError, match=r"a\.txt: cannot be written \(No space left on device\)")
+    with refused, atomic_path(tmp_path / "a.txt"):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    with pytest.raises(PermissionError), atomic_path(tmp_path / "a.txt"):
+        raise PermissionError(errno.EACCES, "denied", "another.txt")
 
 
 def test_text_is_utf_8_whatever_the_locale(tmp_path: Path) -> None:

@@ -2,7 +2,7 @@
 """The state of a door from one depth-camera point cloud.
 
 The public names are `Predictor`, `Prediction`, `Gate`, `StateFilter`, `wait_for`, `DoorState`, `read_cloud`,
-`create_network` and `list_networks`; each is imported when it is first used, so that `import doorstate` and the
+`ReadOptions`, `create_network` and `list_networks`; each is imported when it is first used, so that `import doorstate` and the
 command line's help stay quick.
 """
 
@@ -12,7 +12,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from doorstate.clouds.io import read_cloud
+    from doorstate.clouds.io import ReadOptions, read_cloud
     from doorstate.deployment.gate import Gate
     from doorstate.deployment.predictor import Prediction, Predictor
     from doorstate.deployment.stream import StateFilter, wait_for
@@ -25,6 +25,7 @@ __all__ = [
     "Gate",
     "Prediction",
     "Predictor",
+    "ReadOptions",
     "StateFilter",
     "create_network",
     "list_networks",
@@ -37,6 +38,7 @@ _HOME = {
     "Gate": "doorstate.deployment.gate",
     "Prediction": "doorstate.deployment.predictor",
     "Predictor": "doorstate.deployment.predictor",
+    "ReadOptions": "doorstate.clouds.io",
     "StateFilter": "doorstate.deployment.stream",
     "create_network": "doorstate.networks",
     "list_networks": "doorstate.networks",

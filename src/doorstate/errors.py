@@ -12,6 +12,7 @@ DoorstateError
 ├── RunError               a training run or comparison folder cannot be used or continued
 ├── WeightsError           a weights file is missing, damaged, or made for something else
 ├── ExportError            a network cannot be exported, or the file would answer otherwise
+├── OutputError            a file cannot be written where it was asked for
 └── MissingExtraError      an optional package is needed and not installed
 """
 
@@ -20,6 +21,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from pydantic import ValidationError
 
 LONGEST_LINE = 1000  # letters: a file may name a million fields
@@ -75,6 +78,10 @@ class ExportError(DoorstateError):
     """A network cannot be exported, or the file would answer otherwise."""
 
 
+class OutputError(DoorstateError):
+    """A file cannot be written where it was asked for."""
+
+
 class MissingExtraError(DoorstateError):
     """An optional package is needed and not installed."""
 
@@ -84,10 +91,12 @@ def not_installed(what: str, *packages: str) -> MissingExtraError:
     return MissingExtraError(f"{what} needs what is not installed: pip install {' '.join(packages)}")
 
 
-def first_problem(error: ValidationError) -> str:
-    """Where the first problem of values lies, if not in the whole, and what it is."""
+def first_problem(error: ValidationError, fields: Iterable[str] = ()) -> str:
+    """Where the first problem of values lies, if not in the whole, and what it is; with all fields if one is wrong."""
     problem = error.errors()[0]
-    return ": ".join(filter(None, [".".join(map(str, problem["loc"])), problem["msg"]]))
+    told = ": ".join(filter(None, [".".join(map(str, problem["loc"])), problem["msg"]]))
+    named = ", ".join(fields) if problem["type"] in ("missing", "extra_forbidden") else ""
+    return f"{told}; fields are {named}" if named else told
 
 
 def one_line(error: Exception) -> str:

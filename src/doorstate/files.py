@@ -10,20 +10,44 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from doorstate.errors import DatasetError
+from doorstate.errors import DatasetError, OutputError
 
 
 @contextmanager
 def atomic_path(target: Path) -> Iterator[Path]:
-    """Give a temporary path beside `target` that replaces it when the block ends without an error."""
-    target.parent.mkdir(parents=True, exist_ok=True)
+    """Give a temporary path beside `target` that replaces it when the block ends without an error.
+
+    Raises:
+        OutputError: it cannot be written.
+    """
+    check_writable(target)
     # The target's ending stays last: writers such as numpy and matplotlib choose the format by it.
     temporary = target.with_name(f".{os.getpid()}.tmp.{target.name}")
     try:
         yield temporary
         temporary.replace(target)
+    except OSError as error:
+        foreign = error.filename is not None and str(error.filename) != str(temporary)
+        if foreign or isinstance(error, FileNotFoundError):  # of the block itself
+            raise
+        raise OutputError(f"{target}: cannot be written ({error.strerror or error})") from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def check_writable(target: Path) -> None:
+    """Make the folder of a file to be written; what is asked before long work is not learned after it.
+
+    Raises:
+        OutputError: there can be no such folder, or nothing may be written into it.
+    """
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"{target}: cannot be written ({error.strerror or error})") from error
+    if target.is_dir() or not os.access(target.parent, os.W_OK):
+        reason = "it is a folder" if target.is_dir() else "nothing may be written into its folder"
+        raise OutputError(f"{target}: cannot be written ({reason})")
 
 
 def is_vacant(folder: Path) -> bool:

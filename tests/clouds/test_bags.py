@@ -232,11 +232,11 @@ def test_rows_of_images_may_be_padded_and_scales_and_roll_are_taken(tmp_path: Pa
 
 
 def test_the_camera_may_be_named_or_given(tmp_path: Path) -> None:
-    other = camera_info("/other", 8, 6, (9, 0, 1, 0, 9, 1, 0, 0, 1), [0] * 12)
+    other = camera_info("/other", 8, 6, (9, 0, 3, 0, 9, 2, 0, 0, 1), [0] * 12)
     path = write_bag(tmp_path, "mcap", [image("/depth/image_raw", DEPTH_MM, "16UC1"), INFO, other])
-    with_k = depth_to_points(DEPTH_M, Intrinsics(8, 6, 9, 9, 1, 1))
+    with_k = depth_to_points(DEPTH_M, Intrinsics(8, 6, 9, 9, 3, 2))
     np.testing.assert_allclose(read_one(path, camera_info_topic="/other"), with_k, rtol=1e-6)
-    for given in (Pinhole(9, 9, 1, 1), Intrinsics(8, 6, 9, 9, 1, 1)):
+    for given in (Pinhole(9, 9, 3, 2), Intrinsics(8, 6, 9, 9, 3, 2)):
         np.testing.assert_allclose(read_one(path, ReadOptions(intrinsics=given)), with_k, rtol=1e-6)
 
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 import tracemalloc
 import warnings
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -163,6 +164,38 @@ def test_a_pinhole_takes_every_image_size(tmp_path: Path) -> None:
     pinhole = Pinhole(CAMERA.fx, CAMERA.fy, CAMERA.cx, CAMERA.cy)
     exact = read_cloud(path, ReadOptions(intrinsics=CAMERA))
     np.testing.assert_array_equal(read_cloud(path, ReadOptions(intrinsics=pinhole)), exact)
+
+
+def test_a_pinhole_of_another_resolution_is_refused(tmp_path: Path) -> None:
+    path = _write(tmp_path, "depth.png", saved(lambda f: Image.fromarray(DEPTH_MM).save(f, "PNG")))
+    of_double_size = Pinhole(2 * CAMERA.fx, 2 * CAMERA.fy, 2 * CAMERA.cx, 2 * CAMERA.cy)
+    with pytest.raises(CameraError, match="of another resolution") as caught:
+        read_cloud(path, ReadOptions(intrinsics=of_double_size))
+    assert _one_line(caught.value, path)
+
+
+def test_units_of_clouds_are_not_passed_over_by_integer_depth(tmp_path: Path) -> None:
+    np.save(tmp_path / "depth.npy", DEPTH_MM)
+    centimetres = ReadOptions(intrinsics=CAMERA, units_m=0.01)
+    with pytest.raises(CameraError, match=r"integer depth is not in --units: say --depth-scale 0\.01"):
+        read_cloud(tmp_path / "depth.npy", centimetres)
+    assert read_cloud(tmp_path / "depth.npy", replace(centimetres, depth_scale_m=0.01)).ndim == 3
+
+
+@pytest.mark.parametrize(
+    "impossible",
+    [
+        {"roll_deg": 45},
+        {"frame": "sideways"},
+        {"units_m": 0.0},
+        {"depth_scale_m": np.nan},
+        {"intrinsics": Pinhole(-5, 5, 2, 2)},
+        {"intrinsics": "camera.yaml"},
+    ],
+)
+def test_impossible_options_are_refused_before_a_file_is_read(impossible: dict[str, Any]) -> None:
+    with pytest.raises(CameraError):
+        ReadOptions(**impossible)
 
 
 def test_depth_of_another_size_names_both_sizes(tmp_path: Path, valid: dict[str, bytes]) -> None:
@@ -374,6 +407,16 @@ def test_find_clouds_names_what_is_missing_or_empty(tmp_path: Path) -> None:
     with pytest.raises(CloudReadError, match=r"pictures: no clouds"):
         find_clouds([tmp_path / "pictures"])
     assert find_clouds([]) == []
+
+
+def test_tables_about_clouds_are_none_and_prepared_data_sets_are_shown_by_view(tmp_path: Path) -> None:
+    for name in ("a.pcd", "index.csv", "manifest.csv", "predictions.csv", "rejected.csv", "points.csv"):
+        (tmp_path / name).touch()
+    assert [path.name for path in find_clouds([tmp_path])] == ["a.pcd", "points.csv"]
+    assert find_clouds([tmp_path / "index.csv"]) == [tmp_path / "index.csv"], "as given"
+    (tmp_path / "dataset.json").touch()
+    with pytest.raises(CloudReadError, match="a prepared data set: doorstate view shows it"):
+        find_clouds([tmp_path])
 
 
 @given(st.lists(st.integers(0, 10**6), min_size=1, max_size=6, unique=True), st.randoms())

@@ -8,10 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from doorstate.clouds.preparation import MIN_POINTS, normalize, prepare_cloud
+from doorstate.clouds.preparation import MIN_POINTS, check_one_cloud, is_image, normalize, prepare_cloud
 from doorstate.clouds.sampling import farthest_point_indices
 from doorstate.errors import CloudContentError
 from doorstate.types import Points
+from hand_made_clouds import image_of_a_rough_wall
 
 NAN, INF = np.nan, np.inf
 
@@ -77,15 +78,21 @@ def test_repeated_points_are_taken_once() -> None:
         (np.zeros((500, 3)), "all measured points lie at the origin: the cloud holds no surface"),
         (cloud(MIN_POINTS - 1), "too few points: 127 measured, at least 128 are needed"),
         (np.ones((500, 3)), "too few points: 1 distinct of 500 measured, at least 128 are needed"),
-        (cloud(500) * 1000, "half of the points are more than .* m away: millimetres[?] say --units mm"),
-        (cloud(500) * 100, "half of the points are more than .* m away: centimetres[?] say --units cm"),
+        (
+            cloud(500) * 1000,
+            "half of the points are more than .* m away: 1000 times too far .* say --units mm .*",
+        ),
+        (
+            cloud(500) * 100,
+            "half of the points are more than .* m away: 100 times too far .* say --units cm .*",
+        ),
         (
             cloud(500) * 15000,
-            "half of the points are more than .* m away: in which unit is it[?] say --units",
+            "half of the points are more than .* m away: in which unit is it[?] say --units .*",
         ),
         (
             cloud(500) / 1000,
-            "half of the points are within .* mm of the camera: kilometres[?] say --units km",
+            "half of the points are within .* mm of the camera: 1000 times too near .* say --units km .*",
         ),
     ],
 )
@@ -145,3 +152,28 @@ def test_nothing_within_reach_is_told() -> None:
     )
     with pytest.raises(CloudContentError, match="too few points: 0 within 5 m"):
         prepare_cloud(cloud, 200, max_depth_m=5.0)
+
+
+def test_an_image_is_told_from_several_clouds() -> None:
+    image = image_of_a_rough_wall(60, 80)
+    assert check_one_cloud(image) is image
+    assert check_one_cloud(image[:1]).shape == (80, 3), "one row is a list of points"
+    holed = np.where(np.random.default_rng(0).random((60, 80, 1)) < 0.6, np.float32(np.nan), image)
+    assert is_image(holed)
+    assert is_image(np.full((60, 80, 3), np.nan)), "nothing to tell it by"
+    scan = np.stack([farthest_first(image.reshape(-1, 3), seed) for seed in range(4)])
+    with pytest.raises(CloudContentError, match=r"\(4, 512, 3\) is no image: .* cloud\[0\]"):
+        check_one_cloud(scan)
+
+
+def farthest_first(points: Points, seed: int) -> Points:
+    shuffled = np.random.default_rng(seed).permutation(points)
+    return prepare_cloud(shuffled, 512).points
+
+
+def test_what_is_too_far_away_is_said_with_how_far() -> None:
+    far = cloud(500) + np.array([20, 0, 0], np.float32)
+    with pytest.raises(
+        CloudContentError, match=r"0 within 5 m ahead, .* half of all are more than 2.* m away"
+    ):
+        prepare_cloud(far, 200, max_depth_m=5)

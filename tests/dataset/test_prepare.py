@@ -294,5 +294,4 @@ def test_nothing_that_could_be_prepared_is_an_error_with_the_first_reason(
         DatasetError, match="none of the 10 clouds could be prepared; the first: too few points: 600"
     ):
         prepare_dataset(Preparation(class_folders, 4096), tmp_path / "doors", workers=1)
-    assert not (tmp_path / "doors" / DESCRIPTION).exists()
-    assert len(read_csv(tmp_path / "doors" / REJECTED)) == 10
+    assert not (tmp_path / "doors").exists(), "the same folder is free for another try"

@@ -82,8 +82,11 @@ def test_small_holes_and_the_edges_of_the_image_are_let_through() -> None:
         (room().reshape(-1, 3)[:100], "too few points"),
         (room(0.5), "half of the points are within"),
         (room(8.0, floor_m=9.0), "half of the points are beyond"),
-        (room()[..., (1, 2, 0)] * np.float32((-1, -1, 1)), "of the points lie behind the camera"),  # optical
-        (room() - np.float32((3.2, 0, 0)), "of the points lie behind the camera"),
+        (
+            room()[..., (1, 2, 0)] * np.float32((-1, -1, 1)),
+            "lie behind the camera: an optical frame? say --frame optical",
+        ),
+        (room() - np.float32((3.2, 0, 0)), "lie behind the camera: a scan"),
         (room()[HEIGHT * 3 // 4 :], "m high: too little for a door"),
         (np.ascontiguousarray(room()[:, : WIDTH // 2]), "degrees wide"),
         (room().reshape(-1, 3)[room().reshape(-1, 3)[:, 1] > 0], "degrees wide"),

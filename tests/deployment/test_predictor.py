@@ -26,6 +26,7 @@ from doorstate.simulation.manifest import unflatten
 from doorstate.training.answers import in_metres
 from doorstate.training.weights import WeightsCard, save_weights
 from doorstate.types import STATES
+from hand_made_clouds import image_of_a_rough_wall
 
 
 @pytest.fixture(scope="module")
@@ -90,9 +91,20 @@ def test_a_frame_without_data_is_unknown_and_costs_its_batch_nothing(predictor: 
     assert predictor.batch([]) == []
 
 
+def test_one_cloud_is_no_batch_and_several_are_no_image(predictor: Predictor) -> None:
+    image = image_of_a_rough_wall(60, 80)
+    for cloud in (image, image.reshape(-1, 3)):
+        with pytest.raises(CloudContentError, match="this is one cloud"):
+            predictor.batch(cloud)
+    several = np.random.default_rng(0).uniform(1, 3, (3, 300, 3)).astype(np.float32)
+    assert len(predictor.batch(several)) == 3
+    with pytest.raises(CloudContentError, match="is no image"):
+        predictor(several)
+
+
 def test_a_batch_in_another_unit_is_an_error(predictor: Predictor) -> None:
     cloud = np.random.default_rng(0).uniform(1, 3, (200, 3)).astype(np.float32)
-    with pytest.raises(CloudContentError, match="millimetres"):
+    with pytest.raises(CloudContentError, match="1000 times too far"):
         predictor.batch([cloud, cloud * 1000])
 
 

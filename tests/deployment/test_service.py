@@ -33,6 +33,7 @@ from doorstate.cli.service import KEEP_ALIVE_S, _listen
 from doorstate.clouds.io import CLOUD_SUFFIXES
 from doorstate.clouds.pcd import write_pcd
 from doorstate.deployment.predictor import Predictor
+from doorstate.deployment.rule_predictor import RulePredictor
 from doorstate.deployment.service import Answer, FileQuery, create_app
 from doorstate.deployment.workload import Limits
 from doorstate.networks import create_network
@@ -68,9 +69,10 @@ class Stopped:
 
 
 @contextmanager
-def serving(gate: Any = None, **limits: Any) -> Iterator[httpx.Client]:
+def serving(gate: Any = None, rule: str = "", **limits: Any) -> Iterator[httpx.Client]:
     """A client of the service, run by Uvicorn in a thread of this process."""
-    app = create_app(Predictor(NETWORK, CARD, 256, gate=gate), Limits(**{"workers": 1} | limits))
+    answering = RulePredictor.load(rule) if rule else Predictor(NETWORK, CARD, 256, gate=gate)
+    app = create_app(answering, Limits(**{"workers": 1} | limits))
     listening = socket.create_server(("127.0.0.1", 0))
     config = uvicorn.Config(
         app,
@@ -211,7 +213,7 @@ def test_frame_units_and_camera_mean_what_they_mean_to_the_command(client: httpx
         ("", NPY, 415, "unknown type"),
         ("format=npy", bytes_of(CLOUD * np.nan), 422, "all points are NaN"),
         ("format=npy", bytes_of(CLOUD[:0]), 422, "holds no points"),
-        ("format=npy", bytes_of(CLOUD * 1000), 422, "millimetres\\? say units mm"),
+        ("format=npy", bytes_of(CLOUD * 1000), 422, "1000 times too far .* say units mm"),
         ("format=xyz", b"1 2 3\n" * 20_000, 413, "more than 0.0953674 MB"),
     ],
 )
@@ -237,6 +239,17 @@ def test_health_says_what_answers(client: httpx.Client) -> None:
         "points": 256,
         "version": doorstate.__version__,
     }
+
+
+def test_a_rule_answers_too() -> None:
+    with serving(rule="plane_state") as asking:
+        assert asking.get("/health").json() == {
+            "ready": True,
+            "rule": "plane_state",
+            "version": doorstate.__version__,
+        }
+        answer = asking.post("/predict?format=npy", content=NPY).json()
+    assert answer["points"] == len(CLOUD.reshape(-1, 3))
 
 
 def test_openapi_tells_all(client: httpx.Client) -> None:

@@ -8,9 +8,11 @@ Exit codes: 0 all well, 1 something could not be done (said in one line), 2 wron
 from __future__ import annotations
 
 import sys
+from typing import Annotated
 
 import typer
 
+from doorstate import __version__
 from doorstate.cli.answers import info, predict
 from doorstate.cli.data import join, prepare, simulate
 from doorstate.cli.evaluation import evaluate
@@ -21,7 +23,14 @@ from doorstate.cli.training import compare, report, train
 from doorstate.cli.transfer import transfer
 from doorstate.cli.viewing import view
 from doorstate.cli.worlds import export_sdf
-from doorstate.errors import DoorstateError
+from doorstate.errors import ConfigError, DoorstateError
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        print(__version__)  # noqa: T201
+        raise typer.Exit
+
 
 app = typer.Typer(
     name="doorstate",
@@ -51,6 +60,16 @@ for command in (
 ):
     app.command()(command)
 
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", help="Say the version and end.", is_eager=True, callback=_version)
+    ] = False,
+) -> None:
+    """What stands before a command."""
+
+
 _RESUMABLE = {"simulate", "prepare", "train", "compare", "resolution", "transfer"}
 
 
@@ -59,7 +78,8 @@ def main() -> None:
     try:
         app()
     except DoorstateError as error:
-        sys.exit(f"doorstate: {error}")
+        print(f"doorstate: {error}", file=sys.stderr)  # noqa: T201
+        sys.exit(2 if isinstance(error, ConfigError) else 1)
     except KeyboardInterrupt:
         goes_on = "; the same command goes on from here" if _RESUMABLE & set(sys.argv[1:2]) else ""
         print(f"doorstate: stopped{goes_on}", file=sys.stderr)  # noqa: T201

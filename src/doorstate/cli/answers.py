@@ -27,7 +27,7 @@ from doorstate.cli.options import (
     files_or_bag,
     read_options,
 )
-from doorstate.cli.predictions import table_cells
+from doorstate.cli.predictions import WRITERS, destination
 from doorstate.deployment.answers import described_file
 from doorstate.errors import ConfigError, DoorstateError, MissingExtraError
 
@@ -39,7 +39,7 @@ def predict(
     files: Annotated[
         list[Path] | None, typer.Argument(help="Clouds, depth images, or folders of them.")
     ] = None,
-    network: Network = "pointnet2",
+    network: Network = None,
     weights: Weights = None,
     rule: RuleName = None,
     points: PointCount = None,
@@ -48,9 +48,7 @@ def predict(
     topic: Topic = None,
     camera_info_topic: CameraInfoTopic = None,
     every: Annotated[int, typer.Option(help="Answer every Nth message of the bag.", min=1)] = 1,
-    out: Annotated[
-        Path | None, typer.Option(help="Write the answers of the bag to this .csv or .jsonl file.")
-    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Write the answers to this .csv or .jsonl file.")] = None,
     frame: Frame = "body",
     roll: Roll = 0,
     units: Units = "m",
@@ -61,24 +59,25 @@ def predict(
     cx: Focal = None,
     cy: Focal = None,
 ) -> None:
-    """Tell the state of the door in each file (.pcd .ply .npy .npz .xyz .csv, depth .png) or message of a ROS bag.
+    """Tell the state of the door in each file (.pcd .ply .npy .npz .xyz .txt .csv, depth .png) or message of a ROS bag.
 
     \b
     Examples:
       doorstate predict cloud.pcd
       doorstate predict --frame optical --json recordings/
+      doorstate predict recordings/ --out states.csv
       doorstate predict --rule plane_state cloud.pcd
       doorstate predict depth.png --fx 385.9 --fy 385.4 --cx 317.8 --cy 243.7
       doorstate predict depth.png --intrinsics camera_info.yaml --roll 90
       doorstate predict --bag run.bag --topic /camera/depth/points --frame optical --out run.csv
     """
-    from doorstate.cli.bags import WRITERS, predict_bag
+    from doorstate.cli.bags import predict_bag
     from doorstate.clouds.io import find_clouds
     from doorstate.deployment.loading import load_predictor
 
     files_or_bag(files, bag)
-    if bag is None and (topic, camera_info_topic, every, out) != (None, None, 1, None):
-        raise ConfigError("--topic, --camera-info-topic, --every and --out are for --bag")
+    if bag is None and (topic, camera_info_topic, every) != (None, None, 1):
+        raise ConfigError("--topic, --camera-info-topic and --every are for --bag")
     if out is not None and as_json:
         raise ConfigError("--out writes JSON lines to a file that ends in .jsonl: leave --json out")
     if out is not None and out.suffix not in WRITERS:
@@ -87,7 +86,7 @@ def predict(
     found = find_clouds(files or [])
     load = partial(load_predictor, network, weights, rule, points)
     if bag is None:
-        _predict_files(load(), found, options, as_json)
+        _predict_files(load(), found, options, out, as_json)
     else:
         predict_bag(load, bag, options, topic, camera_info_topic, every, out, as_json)
 
@@ -132,25 +131,18 @@ def info(as_json: Annotated[bool, typer.Option("--json", help="As one JSON objec
     print_table("", ["rule", "after"], [[name, create_rule(name).source] for name in list_rules()])
 
 
-def _predict_files(predictor: Any, paths: list[Path], options: ReadOptions, as_json: bool) -> None:
-    from doorstate.console import err, print_table, progress_bar
-    from doorstate.types import STATES
+def _predict_files(
+    predictor: Any, paths: list[Path], options: ReadOptions, out: Path | None, as_json: bool
+) -> None:
+    from doorstate.console import err, progress_bar
 
-    rows: list[list[str]] = []
     failures = 0
-    with progress_bar("Predicting") as progress:
+    with destination("file", out, as_json) as write, progress_bar("Predicting") as progress:
         for number, path in enumerate(paths):
             answer = _answer(predictor, path, options)
             failures += "error" in answer
-            if as_json:
-                print(json.dumps(answer, ensure_ascii=False), flush=True)  # noqa: T201
-            elif "error" in answer:
-                err.print(f"{answer['file']}: {answer['error']}", style="red", soft_wrap=True)
-            else:
-                rows.append([answer["file"], *table_cells(answer)])
+            write(answer)
             progress(number + 1, len(paths))
-    if rows:
-        print_table("", ["file", "state", *STATES, "points", "ms"], rows)
     if failures:
         err.print(f"{failures} of {len(paths)} files could not be answered")
         raise typer.Exit(1)

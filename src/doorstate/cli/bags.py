@@ -3,24 +3,19 @@
 
 from __future__ import annotations
 
-import csv
-import json
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
 
-from doorstate.cli.predictions import table_cells
+from doorstate.cli.predictions import destination
 from doorstate.deployment.answers import described
 from doorstate.errors import CloudReadError, DoorstateError
 
 if TYPE_CHECKING:
     from doorstate.clouds.bags import BagTopic, StampedCloud
     from doorstate.clouds.io import ReadOptions
-
-Write = Callable[[dict[str, Any]], None]
 
 
 def predict_bag(
@@ -43,7 +38,7 @@ def predict_bag(
         predictor = load()  # takes a second: a recording that cannot be used is told before
         total = -(-chosen.messages // every)
         clouds = bag.clouds(chosen, options, camera_info_topic, every)
-        with _destination(out, as_json) as write, progress_bar("Predicting") as progress:
+        with destination("stamp_s", out, as_json) as write, progress_bar("Predicting") as progress:
             for answer, frame_id in _answers(predictor, clouds):
                 if count == 0:
                     hint_at_frame(chosen, options, frame_id)
@@ -80,62 +75,3 @@ def _answers(predictor: Any, clouds: Iterable[StampedCloud]) -> Iterator[tuple[d
             yield answer, frame_id
     except CloudReadError as error:
         yield {"stamp_s": None, "error": str(error)}, ""
-
-
-@contextmanager
-def _destination(out: Path | None, as_json: bool) -> Iterator[Write]:
-    from doorstate.files import atomic_path
-
-    if out is None:
-        with _printed_lines() if as_json else _printed_table() as write:
-            yield write
-        return
-    with atomic_path(out) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
-        yield WRITERS[out.suffix](stream)
-
-
-@contextmanager
-def _printed_lines() -> Iterator[Write]:
-    yield lambda answer: print(json.dumps(answer, ensure_ascii=False), flush=True)  # noqa: T201
-
-
-@contextmanager
-def _printed_table() -> Iterator[Write]:
-    from doorstate.console import err, print_table
-    from doorstate.types import STATES
-
-    rows: list[list[str]] = []
-
-    def write(answer: dict[str, Any]) -> None:
-        stamp = "-" if answer["stamp_s"] is None else f"{answer['stamp_s']:.6f}"
-        if "error" in answer:
-            err.print(f"{stamp}: {answer['error']}", style="red", soft_wrap=True)
-        else:
-            rows.append([stamp, *table_cells(answer)])
-
-    yield write
-    if rows:
-        print_table("", ["stamp", "state", *STATES, "points", "ms"], rows)
-
-
-def _json_lines(stream: Any) -> Write:
-    return lambda answer: stream.write(json.dumps(answer, ensure_ascii=False) + "\n")
-
-
-def _csv_rows(stream: Any) -> Write:
-    from doorstate.deployment.answers import FURTHER
-    from doorstate.types import STATES
-
-    columns = ["stamp_s", "state", *STATES, "points", "milliseconds", *FURTHER, "reason", "error"]
-    rows = csv.DictWriter(stream, columns, lineterminator="\n")
-    rows.writeheader()
-
-    def write(answer: dict[str, Any]) -> None:
-        flat = answer | answer.get("probabilities", {})
-        rows.writerow({column: flat.get(column) for column in columns})
-
-    return write
-
-
-WRITERS: dict[str, Callable[[Any], Write]] = {".csv": _csv_rows, ".jsonl": _json_lines}
-"""By the ending of the file."""

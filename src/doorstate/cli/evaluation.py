@@ -21,13 +21,14 @@ from doorstate.cli.options import (
     Units,
     read_options,
 )
-from doorstate.errors import ConfigError
+from doorstate.errors import CloudReadError, ConfigError
 
 if TYPE_CHECKING:
     from doorstate.deployment.asking import Asked, Methods
     from doorstate.evaluation.table import Table
 
 _DOOR = "door"  # the column that names doors, where there is one
+_PAGE = "frames.html"
 
 
 def evaluate(
@@ -84,18 +85,22 @@ def evaluate(
       doorstate evaluate recordings/ --by sensor --by door:glass --all --out report
       doorstate evaluate DeepDoors2 --layout deepdoors2 --weights mine.safetensors --by split --json
     """
-    from doorstate.console import err, print_table, progress_bar
-    from doorstate.console import out as stdout
+    from doorstate.console import err, progress_bar
     from doorstate.dataset.labelled import check_column, labelled_frames
     from doorstate.deployment.asking import ask
     from doorstate.evaluation.frame_tables import NO_GROUP, frame_notes, frame_tables
+    from doorstate.files import check_writable
 
+    if everything and out is None:
+        raise ConfigError("--all is for the page of --out FOLDER")
     options = read_options(frame, roll, units, depth_scale, intrinsics, (fx, fy, cx, cy), layout)
     frames = labelled_frames(folder, options, layout)
     if group is None and any(each.columns.get(_DOOR) for each in frames):
         group = _DOOR
     for column in (*(by or ()), *([group] if group else ())):
         check_column(frames, column.partition(":")[0])
+    if out is not None:
+        check_writable(out / _PAGE)
     methods = _methods(network, weights, rule, points)
     with progress_bar("Asking") as progress:
         asked = ask(methods, frames, progress)
@@ -103,18 +108,13 @@ def evaluate(
         message = f"{each.file}: {reason.removeprefix(f'{each.file}: ')}"
         err.print(message, style="red", soft_wrap=True)
     if not asked.frames:
-        raise ConfigError(f"{folder}: none of {len(frames)} files could be read")
+        raise CloudReadError(f"{folder}: none of {len(frames)} files could be read")
     metrics = asked.metrics(group, by or ())
     tables, notes = frame_tables(metrics, group or NO_GROUP), frame_notes(metrics, group or NO_GROUP)
     if as_json:
         print(json.dumps(metrics))  # noqa: T201
     else:
-        for note in notes:
-            stdout.print(note, soft_wrap=True)
-        for table in tables.values():
-            print_table(table.title, table.columns, table.rows)
-            if table.note:
-                stdout.print(table.note, soft_wrap=True)
+        _print(tables, notes)
     if out is not None:
         page = _write(out, folder, methods, asked, metrics, tables, notes, everything)
         err.print(f"{page} shows the frames", soft_wrap=True)
@@ -133,12 +133,14 @@ def _methods(
     from doorstate.deployment.loading import load_predictor
     from doorstate.deployment.predictor import DEFAULT_NETWORK
 
-    asked: list[tuple[str, Path | None, str | None]] = [
+    if points is not None and rules and not (networks or weights):
+        raise ConfigError("a rule looks at all points: leave --points out")
+    asked: list[tuple[str | None, Path | None, str | None]] = [
         *((name, None, None) for name in networks or ()),
-        *(("", path, None) for path in weights or ()),
-        *(("", None, name) for name in rules or ()),
+        *((None, path, None) for path in weights or ()),
+        *((None, None, name) for name in rules or ()),
     ] or [(DEFAULT_NETWORK, None, None)]
-    names = [rule or (path.stem if path else network) for network, path, rule in asked]
+    names = [rule or (path.stem if path else str(network)) for network, path, rule in asked]
     if twice := [name for name in names if names.count(name) > 1]:
         raise ConfigError(
             f"{twice[0]} is asked for twice: name each method once, and weights files differently"
@@ -147,6 +149,17 @@ def _methods(
         name: load_predictor(network, path, rule, None if rule else points)
         for name, (network, path, rule) in zip(names, asked, strict=True)
     }
+
+
+def _print(tables: Mapping[str, Table], notes: Sequence[str]) -> None:
+    from doorstate.console import out, print_table
+
+    for note in notes:
+        out.print(note, soft_wrap=True)
+    for table in tables.values():
+        print_table(table.title, table.columns, table.rows)
+        if table.note:
+            out.print(table.note, soft_wrap=True)
 
 
 def _write(
@@ -177,6 +190,6 @@ def _write(
     chosen = choose_frames(asked, everything)
     with progress_bar("Looking") as progress:
         cards = frame_cards(asked, methods, chosen, progress)
-    page = out / "frames.html"
+    page = out / _PAGE
     write_text(page, render_frame_page(name, tables, asked, cards, notes))
     return page

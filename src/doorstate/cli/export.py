@@ -42,12 +42,14 @@ def export(
     from doorstate.deployment.comparison_clouds import comparison_clouds
     from doorstate.deployment.onnx_export import TOLERANCE, check_installed, export_onnx
     from doorstate.deployment.predictor import packaged_weights
+    from doorstate.files import check_writable
     from doorstate.training.weights import load_weights
 
     path = out or Path(f"{network}{'-int8' if int8 else ''}.onnx")
     if path.suffix != ".onnx":
         raise ConfigError(f"--out {path}: predict knows exported files by the ending .onnx")
     check_installed()
+    check_writable(path)
     loaded, card = load_weights(weights or packaged_weights(network))
     if weights is not None and card.network != network:
         raise ConfigError(f"{weights}: weights of {card.network}, not of {network}")

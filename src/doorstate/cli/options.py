@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from doorstate.errors import ConfigError
+from doorstate.errors import CameraError, ConfigError
 
 if TYPE_CHECKING:
     from doorstate.clouds.io import ReadOptions
@@ -37,7 +37,9 @@ LayoutName = Annotated[
     ),
 ]
 # Who answers, and recordings to answer: the same options for `predict`, `view` and `serve`.
-Network = Annotated[str, typer.Option(help="Network whose packaged weights to use.")]
+Network = Annotated[
+    str | None, typer.Option(help="Network whose packaged weights to use; pointnet2 if not given.")
+]
 Weights = Annotated[Path | None, typer.Option(help="A weights file of your own, in place of --network.")]
 RuleName = Annotated[
     str | None, typer.Option(help="Answer by this rule instead of a network: doorstate info lists them.")
@@ -62,12 +64,9 @@ Changes = Annotated[
 
 
 def files_or_bag(files: list[Path] | None, bag: Path | None) -> None:
-    """End with the exit code of wrong usage unless there are files or a recording, and not both."""
-    from doorstate.console import err
-
+    """Raise ConfigError unless there are files or a recording, and not both."""
     if bool(files) == (bag is not None):
-        err.print("doorstate: give files, or a recording by --bag: one of the two")
-        raise typer.Exit(2)
+        raise ConfigError("give files, or a recording by --bag: one of the two")
 
 
 def read_options(
@@ -88,7 +87,10 @@ def read_options(
             "--layout says how its files are read: leave --frame, --roll, --units and --depth-scale out"
         )
     intrinsics = None if intrinsics_file is None else read_intrinsics(intrinsics_file)
-    return options_from_flags(frame, roll, units, depth_scale, intrinsics, flags)
+    try:
+        return options_from_flags(frame, roll, units, depth_scale, intrinsics, flags)
+    except CameraError as error:  # of what was typed, and of no file
+        raise ConfigError(str(error)) from error
 
 
 Heads = Annotated[

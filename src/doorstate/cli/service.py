@@ -10,8 +10,8 @@ from typing import Annotated
 
 import typer
 
-from doorstate.cli.options import Network, PointCount, Weights
-from doorstate.errors import ConfigError, not_installed
+from doorstate.cli.options import Network, PointCount, RuleName, Weights
+from doorstate.errors import DoorstateError, not_installed
 
 # Longer than clients (httpx: 5 s) and proxies (nginx: 60 s) keep an idle connection. If the service closes it first, a
 # request sent at that moment is lost to a reset.
@@ -23,8 +23,9 @@ def serve(
         str, typer.Option(help="Address to listen on; 0.0.0.0 lets other machines in.")
     ] = "127.0.0.1",
     port: Annotated[int, typer.Option(help="0 takes any that is free.", min=0, max=65535)] = 8000,
-    network: Network = "pointnet2",
+    network: Network = None,
     weights: Weights = None,
+    rule: RuleName = None,
     points: PointCount = None,
     max_megabytes: Annotated[float, typer.Option(help="Larger files are refused.", min=0.001)] = 64.0,
     timeout_s: Annotated[
@@ -51,17 +52,14 @@ def serve(
         from doorstate.deployment.workload import Limits
     except ImportError as error:
         raise not_installed("serve", "fastapi", "uvicorn") from error
-    from doorstate.deployment.predictor import Predictor
+    from doorstate.deployment.loading import load_predictor
     from doorstate.jobs import default_workers
-    from doorstate.training.environment import keep_freed_memory
 
     workers = workers or default_workers()
     limits = Limits(int(max_megabytes * 2**20), timeout_s, queue, workers)
     threads = max(1, default_workers() // workers)
-    keep_freed_memory()
-    predictor = Predictor.load(weights or network, points, threads=threads)
-    predictor.warm_up()
-    if weights is None or weights.suffix != ".onnx":
+    predictor = load_predictor(network, weights, rule, points, threads=threads)
+    if rule is None and (weights is None or weights.suffix != ".onnx"):
         import torch
 
         torch.set_num_threads(threads)
@@ -96,7 +94,7 @@ def _listen(host: str, port: int) -> socket.socket:
         )
     except OSError as error:
         reason = str(error.strerror or error).partition(" (while")[0]  # Python repeats the address there
-        raise ConfigError(f"cannot listen on {host}, port {port}: {reason}") from error
+        raise DoorstateError(f"cannot listen on {host}, port {port}: {reason}") from error
     # Connections inherit it. asyncio sets it for its own sockets only; without, the second part of every answer waits
     # 40 ms for the client to acknowledge the first.
     listening.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)

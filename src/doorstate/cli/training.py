@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from doorstate.cli.options import Changes, Heads, recipe_changes
+from doorstate.errors import ConfigError, DatasetError
 
 if TYPE_CHECKING:
     from doorstate.training.comparison import Experiment
 
 
 def train(
-    network: Annotated[str, typer.Argument(help="pointnet, pointnet2, dgcnn, pointcnn or point2sequence.")],
+    network: Annotated[str, typer.Argument(help="As doorstate info lists them, such as pointnet2.")],
     data: Annotated[Path, typer.Option(help="A prepared data set.")],
     out: Annotated[Path, typer.Option(help="Folder of the run; a begun run goes on.")],
     fold: Annotated[int, typer.Option(help="Which of the five folds is tested.", min=0, max=4)] = 0,
@@ -83,7 +84,7 @@ def compare(
     data: Annotated[Path | None, typer.Option(help="A prepared data set.")] = None,
     protocol: Annotated[str | None, typer.Option(help="paper, by-pose or by-scene.")] = None,
     networks: Annotated[
-        str | None, typer.Option(help="Names, separated by commas; all five if not given.")
+        str | None, typer.Option(help="Names, separated by commas; the five of the paper if not given.")
     ] = None,
     rules: Annotated[
         str | None, typer.Option(help="Rules to ask beside the networks, separated by commas.")
@@ -111,6 +112,8 @@ def compare(
     from doorstate.dataset.splits import EVERYTHING
     from doorstate.training.comparison import load_experiment
 
+    if experiment is None and data is None:
+        raise ConfigError("give an experiment file, or a prepared data set by --data")
     given: dict[str, Any] = {
         "dataset": None if data is None else str(data),
         "protocol": protocol,
@@ -163,14 +166,22 @@ def report(
     """
     from doorstate.console import err
     from doorstate.console import out as stdout
+    from doorstate.dataset.store import is_prepared
     from doorstate.evaluation.report import write_dataset_figures, write_everything
 
+    compared = [(folder / "comparison.json").is_file() for folder in folders]
+    for folder, is_compared in zip(folders, compared, strict=True):
+        if not is_compared and (len(folders) > 1 or not is_prepared(folder)):
+            raise DatasetError(
+                f"{folder}: holds no comparison (doorstate compare) and is no prepared data set on its own"
+            )
     target = out or folders[0] / "report"
     with err.status("Writing the report"):
-        if len(folders) == 1 and not (folders[0] / "comparison.json").is_file():
-            page = write_dataset_figures(folders[0], target)
-        else:
-            page = write_everything(folders, target, data)
+        page = (
+            write_everything(folders, target, data)
+            if all(compared)
+            else write_dataset_figures(folders[0], target)
+        )
     stdout.print(f"report: {page}", soft_wrap=True)
 
 

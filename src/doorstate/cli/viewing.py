@@ -51,7 +51,7 @@ def view(
         list[Path] | None,
         typer.Argument(help="Clouds, depth images, folders of them, simulated or prepared data sets."),
     ] = None,
-    network: Network = "pointnet2",
+    network: Network = None,
     weights: Weights = None,
     rule: RuleName = None,
     points: PointCount = None,
@@ -95,6 +95,7 @@ def view(
       doorstate view --live incoming/ --port 8080 --no-open
     """
     from doorstate.deployment.loading import load_predictor
+    from doorstate.files import check_writable
 
     files_or_bag(files, bag)
     if bag is None and (topic, camera_info_topic) != (None, None):
@@ -105,6 +106,8 @@ def view(
         raise ConfigError("--live takes one folder or a --bag, and writes no page: leave --out out")
     if out is not None and out.suffix not in (".html", ".htm"):
         raise ConfigError(f"--out {out}: name a .html file")
+    if out is not None:
+        check_writable(out)
     options = read_options(frame, roll, units, depth_scale, intrinsics, (fx, fy, cx, cy))
     source: AbstractContextManager[Clouds]
     if bag is not None:

@@ -55,6 +55,12 @@ def points_from_optical(points: Points) -> Points:
     return np.stack((forward, -right, -down), axis=-1)
 
 
+def check_roll(roll_deg: int) -> None:
+    """Raise CameraError unless the roll is 0, 90, 180 or 270 degrees."""
+    if roll_deg not in ROLLS_DEG:
+        raise CameraError(f"a roll of {roll_deg} degrees is not 0, 90, 180 or 270")
+
+
 def undo_roll(points: Points, roll_deg: int) -> Points:
     """Turn (..., 3) body-frame points of a rolled camera about x until z is up again.
 
@@ -63,6 +69,7 @@ def undo_roll(points: Points, roll_deg: int) -> Points:
     Raises:
         CameraError: when the roll is not 0, 90, 180 or 270 degrees.
     """
+    check_roll(roll_deg)
     forward, left, up = np.moveaxis(points, -1, 0)
     match roll_deg:
         case 0:
@@ -71,8 +78,6 @@ def undo_roll(points: Points, roll_deg: int) -> Points:
             upright = (forward, -up, left)
         case 180:
             upright = (forward, -left, -up)
-        case 270:
-            upright = (forward, up, -left)
         case _:
-            raise CameraError(f"a roll of {roll_deg} degrees is not 0, 90, 180 or 270")
+            upright = (forward, up, -left)
     return np.stack(upright, axis=-1)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from doorstate.clouds.arrays import parse_npy, parse_npz
 from doorstate.clouds.camera import Intrinsics, Pinhole
 from doorstate.clouds.declared import check_points
-from doorstate.clouds.depth import depth_to_points, points_from_optical, undo_roll
+from doorstate.clouds.depth import check_roll, depth_to_points, points_from_optical, undo_roll
 from doorstate.clouds.pcd import parse_pcd
 from doorstate.clouds.ply import parse_ply
 from doorstate.clouds.png import parse_depth_png
@@ -55,7 +55,7 @@ class ReadOptions:
         units_m: metres per unit of cloud files and of floating point depth images (metres by ROS REP 118).
 
     Raises:
-        CameraError: when a scale is not positive, or the frame is neither of the two.
+        CameraError: one of them is impossible.
     """
 
     frame: Literal["body", "optical"] = "body"
@@ -70,10 +70,17 @@ class ReadOptions:
         for scale_m in (self.depth_scale_m, self.units_m):
             if not (math.isfinite(scale_m) and scale_m > 0):
                 raise CameraError(f"a scale of {scale_m} metres per unit is impossible: it must be positive")
+        check_roll(self.roll_deg)
+        if isinstance(self.intrinsics, Pinhole):
+            Intrinsics(1, 1, *self.intrinsics)  # whose numbers are checked
+        elif not isinstance(self.intrinsics, Intrinsics | None):
+            raise CameraError(f"intrinsics {self.intrinsics!r}: give Intrinsics or a Pinhole")
 
 
 DEFAULT_OPTIONS = ReadOptions()
 _BAGS = (".bag", ".db3", ".mcap")
+_PREPARED = "dataset.json"  # of dataset.store
+_ABOUT_CLOUDS = ("index.csv", "manifest.csv", "predictions.csv", "rejected.csv")
 UNITS_M = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "km": 1000.0}
 
 
@@ -90,17 +97,19 @@ def options_from_flags(
     Args:
         frame, roll, depth_scale: as of `ReadOptions`.
         units: a name of `UNITS_M`.
-        intrinsics: camera of depth images, which goes before the flags.
+        intrinsics: camera of depth images.
         flags: fx, fy, cx, cy in pixels: all or none.
 
     Raises:
-        ConfigError: no such unit, or some of the flags only.
+        ConfigError: no such unit, some of the flags only, or flags beside intrinsics.
         CameraError: as of `ReadOptions`.
     """
     if units not in UNITS_M:
         raise ConfigError(f"--units {units}: choose one of {', '.join(UNITS_M)}")
     camera: Intrinsics | Pinhole | None = intrinsics
-    if camera is None and any(value is not None for value in flags):
+    if any(value is not None for value in flags):
+        if camera is not None:
+            raise ConfigError("--intrinsics and --fx --fy --cx --cy say the same: give one of them")
         fx, fy, cx, cy = flags
         if fx is None or fy is None or cx is None or cy is None:
             raise ConfigError("--fx, --fy, --cx and --cy belong together: give all four")
@@ -173,7 +182,8 @@ def check_suffix(suffix: str) -> None:
 def find_clouds(paths: Sequence[Path]) -> list[Path]:
     """List the files to read: files as given, folders searched through.
 
-    In folders, hidden files and colour images beside depth images (`*_rgb.png`) are passed over.
+    In folders, hidden files, colour images beside depth images (`*_rgb.png`) and tables about clouds (`index.csv`,
+    `manifest.csv`, `predictions.csv`, `rejected.csv`) are passed over.
 
     Returns:
         Paths in the order given, those of one folder sorted as people count (2 before 10).
@@ -183,6 +193,10 @@ def find_clouds(paths: Sequence[Path]) -> list[Path]:
     """
     found: list[Path] = []
     for path in paths:
+        if (path / _PREPARED).is_file():
+            raise CloudReadError(
+                f"{path}: a prepared data set: doorstate view shows it, train learns from it"
+            )
         if path.is_dir():
             members = [member for member in path.rglob("*") if member.is_file()]
             clouds = [member for member in members if _is_cloud(member.relative_to(path))]
@@ -203,7 +217,8 @@ def find_clouds(paths: Sequence[Path]) -> list[Path]:
 
 def _is_cloud(path: Path) -> bool:
     hidden = any(part.startswith(".") for part in path.parts)
-    return path.suffix.lower() in _PARSERS and not hidden and not path.name.lower().endswith("_rgb.png")
+    about = path.name in _ABOUT_CLOUDS or path.name.lower().endswith("_rgb.png")
+    return path.suffix.lower() in _PARSERS and not hidden and not about
 
 
 def _natural_order(path: Path) -> tuple[list[str | int], str]:
@@ -232,13 +247,32 @@ def points_from_depth(stored: NDArray[Any], options: ReadOptions) -> Points:
             "give --intrinsics FILE or --fx --fy --cx --cy"
         )
     if isinstance(intrinsics, Pinhole):
-        intrinsics = Intrinsics(width, height, *intrinsics)
-    scale_m = options.units_m if stored.dtype.kind == "f" else options.depth_scale_m
+        intrinsics = _of_image(intrinsics, width, height)
+    scale_m = _metres_per_unit(stored.dtype.kind == "f", options)
     with np.errstate(invalid="ignore"):  # a NaN that signals is a NaN
         depth_m = stored.astype(np.float64) * scale_m
     if stored.dtype.newbyteorder("=") == np.uint16:
         depth_m[stored == _NO_RETURN] = np.nan
     return depth_to_points(depth_m, intrinsics, options.roll_deg)
+
+
+def _of_image(camera: Pinhole, width: int, height: int) -> Intrinsics:
+    """A camera of whatever size as that of an image; its centre gives numbers of another resolution away."""
+    if not (width / 4 <= camera.cx <= width * 3 / 4 and height / 4 <= camera.cy <= height * 3 / 4):
+        raise CameraError(
+            f"cx = {camera.cx:g}, cy = {camera.cy:g} are far from the middle of an image of {width} x {height} pixels: "
+            "of another resolution? for a cut image say its size as well, in a file for --intrinsics"
+        )
+    return Intrinsics(width, height, *camera)
+
+
+def _metres_per_unit(is_float: bool, options: ReadOptions) -> float:
+    """The scale of the two that is for this kind of depth image; CameraError if only the other one was said."""
+    if is_float:
+        return options.units_m
+    if options.units_m not in (1.0, options.depth_scale_m):
+        raise CameraError(f"integer depth is not in --units: say --depth-scale {options.units_m:g}")
+    return options.depth_scale_m
 
 
 def _points_from_rows(stored: NDArray[Any], options: ReadOptions) -> Points:

@@ -19,15 +19,12 @@ SCALE_M = 3.0  # half the depth of a typical frame: networks were designed for c
 _LARGEST_MEDIAN_M = 50.0
 _SMALLEST_MEDIAN_M = 0.02
 _LIKELY_MEDIAN_M = (0.8, 8.0)  # less than a factor of ten apart, so that one unit fits
-_OTHER_UNITS = {
-    "mm": ("millimetres", 0.001),
-    "cm": ("centimetres", 0.01),
-    "dm": ("decimetres", 0.1),
-    "km": ("kilometres", 1000.0),
-}
+_OTHER_UNITS_M = {"mm": 0.001, "cm": 0.01, "dm": 0.1, "km": 1000.0}
 _NO_RETURN = 1e6  # in any unit; some drivers write FLT_MAX where nothing returned
 _PIXELS_PER_POINT = 16  # that thinning leaves to choose from
 _UNITS_FROM_POINTS = 4096
+_OF_DEPTH = "(integer depth: --depth-scale)"
+_IMAGE_ROWS, _IMAGE_COLUMNS, _FEWEST_PAIRS = 16, 64, 64  # looked at, to see whether it is an image
 
 
 class PreparedCloud(NamedTuple):
@@ -78,8 +75,10 @@ def prepare_cloud(
         measured = measured[clean[:, 0] <= max_depth_m]
         clean = flat[measured]
         if len(clean) < MIN_POINTS:
+            median_m = _median_range(flat[is_measured(flat)])
             raise TooFewPointsError(
-                f"too few points: {len(clean)} within {max_depth_m:g} m, at least {MIN_POINTS} are needed"
+                f"too few points: {len(clean)} within {max_depth_m:g} m ahead, at least {MIN_POINTS} are needed; "
+                f"half of all are more than {median_m:.1f} m away"
             )
     chosen = _without_repeats(farthest_point_indices(clean, min(count, len(clean))))
     if len(chosen) < min(count, MIN_POINTS):
@@ -102,6 +101,43 @@ def check_form(points: Points) -> Points:
         hint = "; take x, y, z with points[..., :3]" if cloud.ndim in (2, 3) and cloud.shape[-1] > 3 else ""
         raise CloudContentError(f"a cloud is numbers of (N, 3) or (H, W, 3), this is {form}{hint}")
     return cloud
+
+
+def check_one_cloud(points: Points) -> Points:
+    """The same, if it is one cloud; an image of one row or column as (N, 3).
+
+    Raises:
+        CloudContentError: as of `check_form`, or several clouds as (B, N, 3), which would be answered as one image.
+    """
+    cloud = check_form(points)
+    if cloud.ndim == 3 and 1 in cloud.shape[:2]:
+        return cloud.reshape(-1, 3)
+    if cloud.ndim == 3 and not is_image(cloud):
+        raise CloudContentError(
+            f"{cloud.shape} is no image: neighbours in a row lie as far apart as any two points; one of several clouds "
+            "is cloud[0], and all points in any order are cloud.reshape(-1, 3)"
+        )
+    return cloud
+
+
+def is_image(cloud: NDArray[Any]) -> bool:
+    """Whether points (H, W, 3) are a camera's: rays of neighbours in a row are closer than those half a row apart.
+
+    True where too little was measured to tell.
+    """
+    rows = cloud[:: max(1, len(cloud) // _IMAGE_ROWS)].astype(np.float64)
+    columns = np.arange(0, rows.shape[1], max(1, rows.shape[1] // _IMAGE_COLUMNS))
+
+    def typical_turn(step: int) -> float:
+        here, there = rows[:, columns], rows[:, (columns + step) % rows.shape[1]]
+        both = is_measured(here) & is_measured(there)
+        here, there = here[both], there[both]
+        if len(here) < _FEWEST_PAIRS:
+            return np.nan
+        lengths = np.linalg.norm(here, axis=1) * np.linalg.norm(there, axis=1)
+        return float(np.median(1 - (here * there).sum(axis=1) / lengths))
+
+    return not typical_turn(1) > 0.5 * typical_turn(rows.shape[1] // 2)
 
 
 def is_measured(points: NDArray[np.floating[Any]]) -> NDArray[np.bool_]:
@@ -146,9 +182,13 @@ def _without_repeats(chosen: Indices) -> Indices:
     return chosen[: len(np.unique(chosen))]
 
 
-def _check_units(points: Points) -> None:
+def _median_range(points: Points) -> float:
     some = points[:: max(1, len(points) // _UNITS_FROM_POINTS)].astype(np.float64)
-    median = float(np.median(np.linalg.norm(some, axis=1)))
+    return float(np.median(np.linalg.norm(some, axis=1)))
+
+
+def _check_units(points: Points) -> None:
+    median = _median_range(points)
     if median > _LARGEST_MEDIAN_M:
         raise CloudContentError(
             f"half of the points are more than {median:.0f} m away: {_likely_unit(median)}"
@@ -160,8 +200,9 @@ def _check_units(points: Points) -> None:
 
 
 def _likely_unit(median: float) -> str:
-    """A question about the unit that would bring half of the points to where doors are."""
-    for unit, (name, metres) in _OTHER_UNITS.items():
+    """How far the unit is off that would bring half of the points to where doors are; one may have been said."""
+    for unit, metres in _OTHER_UNITS_M.items():
         if _LIKELY_MEDIAN_M[0] <= median * metres <= _LIKELY_MEDIAN_M[1]:
-            return f"{name}? say --units {unit}"
-    return "in which unit is it? say --units"
+            times = f"{1 / metres:g} times too far" if metres < 1 else f"{metres:g} times too near"
+            return f"{times} for a door; if it was read as metres, say --units {unit} {_OF_DEPTH}"
+    return f"in which unit is it? say --units {_OF_DEPTH}"

@@ -39,6 +39,7 @@ from doorstate.types import Points
 
 REJECTED = "rejected.csv"
 _SCRATCH = "pieces"
+_CLAIM = "preparation.json"
 _SAMPLES_PER_PIECE = 24
 
 
@@ -125,7 +126,11 @@ def prepare_dataset(
         return PreparationSummary(open_dataset(folder), rejected)
     run_pieces(_prepare_piece, pieces, paths, workers or default_workers(), progress)
     rows = [row for piece in pieces for row in piece.rows]
-    rejected = _assemble(folder, asked, rows, paths)
+    reasons = _reasons(paths)
+    if all(reasons):
+        _release(folder)
+        raise DatasetError(f"none of the {len(rows)} clouds could be prepared; the first: {reasons[0]}")
+    rejected = _assemble(folder, asked, rows, paths, reasons)
     name = read_settings(asked.source).preset.name if asked.simulated else asked.source.resolve().name
     DatasetDescription(
         kind="simulated" if asked.simulated else "imported",
@@ -186,7 +191,7 @@ def _simulated_rows(source: Path) -> list[dict[str, str]]:
 
 
 def _claim(folder: Path, text: str) -> None:
-    path = folder / "preparation.json"
+    path = folder / _CLAIM
     if is_vacant(folder):
         write_text(path, text)
     elif not path.is_file():
@@ -234,13 +239,26 @@ def _from_simulation(row: dict[str, str], asked: Preparation) -> tuple[Points, n
     return sample_frame(frame, asked.num_points, asked.max_depth_m)
 
 
-def _assemble(
-    folder: Path, asked: Preparation, rows: list[dict[str, str]], paths: list[Path]
-) -> list[dict[str, str]]:
+def _release(folder: Path) -> None:
+    """Leave nothing of a preparation that made nothing: with better options the same folder is asked for again."""
+    shutil.rmtree(folder / _SCRATCH)
+    (folder / _CLAIM).unlink()
+    if is_vacant(folder):
+        shutil.rmtree(folder)
+
+
+def _reasons(paths: list[Path]) -> list[str]:
+    """Why each cloud was left out, or nothing."""
     reasons: list[str] = []
     for path in paths:
         with np.load(path, allow_pickle=False) as piece:
             reasons += [str(reason) for reason in piece["reasons"]]
+    return reasons
+
+
+def _assemble(
+    folder: Path, asked: Preparation, rows: list[dict[str, str]], paths: list[Path], reasons: list[str]
+) -> list[dict[str, str]]:
     kept = [row for row, reason in zip(rows, reasons, strict=True) if not reason]
     rejected = [
         {"sample_id": row["sample_id"], "file": row.get("file", ""), "reason": reason}
@@ -249,10 +267,6 @@ def _assemble(
     ]
     if rejected:
         write_csv(folder / REJECTED, rejected)
-    if not kept:
-        raise DatasetError(
-            f"none of the {len(rows)} clouds could be prepared; the first: {rejected[0]['reason']}"
-        )
     _concatenate(folder / CLOUDS, paths, "clouds", (len(kept), asked.num_points, 3), np.float32)
     if asked.simulated:
         _concatenate(folder / PARTS, paths, "parts", (len(kept), asked.num_points), np.uint8)

@@ -185,6 +185,11 @@ def _keep(kept: dict[int, _T], index: int, value: _T, most: int) -> None:
     kept[index] = value
 
 
+def is_prepared(folder: Path) -> bool:
+    """Whether `folder` holds a prepared data set."""
+    return (folder / DESCRIPTION).is_file()
+
+
 def open_dataset(folder: Path) -> PreparedDataset:
     """Open a prepared data set.
 
@@ -192,7 +197,7 @@ def open_dataset(folder: Path) -> PreparedDataset:
         DatasetError: missing, incomplete or inconsistent.
     """
     path = folder / DESCRIPTION
-    if not path.is_file():
+    if not is_prepared(folder):
         raise DatasetError(f"{folder}: no prepared data set here; make one with 'doorstate prepare'")
     try:
         description = DatasetDescription.model_validate_json(path.read_text(encoding="utf-8"))

@@ -109,7 +109,12 @@ class Gate:
         some = points[:: max(1, len(points) // 8192)].astype(np.float64)
         share = float((some[:, 0] < 0).mean())
         if share > self.max_behind_share:
-            return f"{share:.0%} of the points lie behind the camera: a scan, or a cloud in another frame"
+            # Optical clouds look along z: all of them are ahead there.
+            optical = float((some[:, 2] > 0).mean()) > 1 - self.max_behind_share
+            guess = (
+                "an optical frame? say --frame optical" if optical else "a scan, or a cloud in another frame"
+            )
+            return f"{share:.0%} of the points lie behind the camera: {guess}"
         median_m = float(np.median(np.linalg.norm(some, axis=1)))
         if median_m < self.min_median_range_m:
             return f"half of the points are within {median_m:.2f} m: something is before the camera"

@@ -13,7 +13,7 @@ from doorstate.training.environment import keep_freed_memory
 
 
 def load_predictor(
-    network: str = DEFAULT_NETWORK,
+    network: str | None = None,
     weights: Path | None = None,
     rule: str | None = None,
     points: int | None = None,
@@ -25,7 +25,7 @@ def load_predictor(
     """Load and warm up.
 
     Args:
-        network: whose packaged weights answer.
+        network: whose packaged weights answer; `DEFAULT_NETWORK` if nobody is named.
         weights: a file in place of them.
         rule: in place of a network.
         points: as of `Predictor.load`, like what follows.
@@ -38,15 +38,15 @@ def load_predictor(
         WeightsError: no such weights, or they cannot be used.
         MissingExtraError: what the weights need is not installed.
     """
+    if sum(each is not None for each in (network, weights, rule)) > 1:
+        raise ConfigError("one answers: give a network, a weights file or a rule")
     keep_freed_memory()
     if rule is None:
         predictor = Predictor.load(
-            weights or network, points, gate=gate, budget_ms=budget_ms, threads=threads
+            weights or network or DEFAULT_NETWORK, points, gate=gate, budget_ms=budget_ms, threads=threads
         )
         predictor.warm_up()
         return predictor
-    if weights is not None or points is not None or budget_ms is not None:
-        raise ConfigError(
-            "a rule has no weights and looks at all points: leave weights, points and time budget out"
-        )
+    if points is not None or budget_ms is not None:
+        raise ConfigError("a rule looks at all points: leave points and time budget out")
     return RulePredictor.load(rule, gate=gate)

@@ -14,10 +14,23 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from doorstate.clouds.preparation import MIN_POINTS, NUM_POINTS, PreparedCloud, prepare_cloud
+from doorstate.clouds.preparation import (
+    MIN_POINTS,
+    NUM_POINTS,
+    PreparedCloud,
+    check_one_cloud,
+    is_image,
+    prepare_cloud,
+)
 from doorstate.deployment.gate import Gate
 from doorstate.deployment.onnx_network import OnnxNetwork
-from doorstate.errors import ConfigError, MissingExtraError, TooFewPointsError, WeightsError
+from doorstate.errors import (
+    CloudContentError,
+    ConfigError,
+    MissingExtraError,
+    TooFewPointsError,
+    WeightsError,
+)
 from doorstate.rules.base import Shape
 from doorstate.training.card import WeightsCard
 from doorstate.types import STATES, DoorState, Points
@@ -191,8 +204,11 @@ class Predictor:
             One prediction for each, in their order; its milliseconds are an equal share of the time for all.
 
         Raises:
-            CloudContentError: one of the clouds is none, or not in metres.
+            CloudContentError: one of the clouds is none, or not in metres; or `clouds` is one cloud.
         """
+        whole = np.asarray(clouds) if hasattr(clouds, "ndim") else None
+        if whole is not None and (whole.ndim == 2 or (whole.ndim == 3 and is_image(whole))):
+            raise CloudContentError(f"this is one cloud, {whole.shape}: give several, or call the predictor")
         started = self.clock()
         looks = [self._look(cloud) for cloud in clouds]
         asked = [number for number, (_, refused) in enumerate(looks) if refused is None]
@@ -226,6 +242,7 @@ class Predictor:
 
     def _look(self, cloud: Points) -> tuple[Points, str | None]:
         """Points to ask about, and why nobody may be asked."""
+        cloud = check_one_cloud(cloud)
         try:
             points = self.prepare(cloud).points
         except TooFewPointsError as error:
@@ -290,6 +307,8 @@ def _load(name_or_path: str | Path, threads: int | None) -> tuple[PointNetwork |
         exported = OnnxNetwork(path, threads)
         return exported, exported.card
     if path.suffix != ".safetensors":
+        if path.suffix or path.exists():
+            raise WeightsError(f"{path}: weights end in .safetensors or .onnx")
         path = packaged_weights(str(name_or_path))
     try:
         from doorstate.training.weights import load_weights

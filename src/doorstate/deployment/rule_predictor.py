@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from doorstate.clouds.preparation import check_form
+from doorstate.clouds.preparation import check_one_cloud
 from doorstate.deployment.gate import Gate
 from doorstate.deployment.predictor import DEFAULT_GATE, Prediction
 from doorstate.rules import create_rule
@@ -54,7 +54,7 @@ class RulePredictor:
             CloudContentError: no cloud.
         """
         started = time.perf_counter()
-        points = check_form(points)
+        points = check_one_cloud(points)
         count = len(measured(points))
         if count == 0:
             return Prediction.none("nothing was measured: the cloud holds no points")

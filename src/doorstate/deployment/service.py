@@ -22,6 +22,7 @@ from doorstate.clouds.io import CLOUD_SUFFIXES, UNITS_M, ReadOptions, options_fr
 from doorstate.deployment.answers import described_file
 from doorstate.deployment.lingering import LingeringClose
 from doorstate.deployment.predictor import Predictor
+from doorstate.deployment.rule_predictor import RulePredictor
 from doorstate.deployment.workload import Limits, Workload
 from doorstate.errors import CloudContentError, DoorstateError
 from doorstate.types import STATES
@@ -103,9 +104,10 @@ class Health(BaseModel):
     """By what files are answered."""
 
     ready: bool
-    network: str
-    points: int
     version: str
+    network: str | None = None
+    points: int | None = Field(default=None, description="That the network looks at.")
+    rule: str | None = Field(default=None, description="In place of a network.")
 
 
 class Problem(BaseModel):
@@ -124,7 +126,7 @@ _PROBLEMS: dict[int | str, dict[str, Any]] = {
 }
 
 
-def create_app(predictor: Predictor, limits: Limits | None = None) -> FastAPI:
+def create_app(predictor: Predictor | RulePredictor, limits: Limits | None = None) -> FastAPI:
     """The service as an ASGI application.
 
     Args:
@@ -153,10 +155,12 @@ def create_app(predictor: Predictor, limits: Limits | None = None) -> FastAPI:
     async def welcome() -> str:
         return _WELCOME
 
-    @app.get("/health", summary="Whether files are answered, and by what")
+    @app.get("/health", summary="Whether files are answered, and by what", response_model_exclude_none=True)
     async def health() -> Health:
+        if isinstance(predictor, RulePredictor):
+            return Health(ready=True, version=__version__, rule=predictor.rule.name)
         return Health(
-            ready=True, network=predictor.card.network, points=predictor.points, version=__version__
+            ready=True, version=__version__, network=predictor.card.network, points=predictor.points
         )
 
     @app.post(

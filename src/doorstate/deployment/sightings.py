@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from doorstate.clouds.io import DEFAULT_OPTIONS, ReadOptions, find_clouds, read_cloud
-from doorstate.dataset.store import DESCRIPTION, PreparedDataset, open_dataset
+from doorstate.dataset.store import PreparedDataset, is_prepared, open_dataset
 from doorstate.errors import CloudReadError, DatasetError, DoorstateError
 from doorstate.files import read_csv
 from doorstate.simulation.frames import replay
@@ -47,7 +47,7 @@ def find_sightings(
     found: list[Callable[[], Sighting]] = []
     files: list[Path] = []
     for path in paths:
-        if (path / DESCRIPTION).is_file():
+        if is_prepared(path):
             dataset = open_dataset(path)
             found += [partial(_of_dataset, dataset, index) for index in range(len(dataset))]
         elif is_simulated(path):

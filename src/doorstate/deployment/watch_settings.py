@@ -64,7 +64,7 @@ class WatchSettings(Frozen):
     def load_predictor(self) -> Predictor | RulePredictor:
         """Who answers; errors as of `doorstate.deployment.loading.load_predictor`."""
         return load_predictor(
-            self.network,
+            None if self.weights or self.rule else self.network,
             Path(self.weights) if self.weights else None,
             self.rule or None,
             self.points or None,

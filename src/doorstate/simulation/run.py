@@ -52,13 +52,12 @@ def simulate_dataset(
     Raises:
         ConfigError: the folder holds something else.
     """
-    _claim(folder, settings)
+    pieces, paths = _claim(folder, settings)
     manifest, scratch = folder / MANIFEST, folder / "pieces"
     if manifest.exists():
         shutil.rmtree(scratch, ignore_errors=True)
         progress(1, 1)
         return read_csv(manifest)
-    pieces, paths = _pieces(folder, settings)
     run_pieces(_simulate_piece, pieces, paths, workers or default_workers(), progress)
     rows = [row for path in paths for row in read_csv(path)]
     write_csv(manifest, rows)
@@ -80,11 +79,10 @@ def simulate_shard(
     Raises:
         ConfigError: the folder holds something else.
     """
-    _claim(folder, settings)
+    pieces, paths = _claim(folder, settings)
     if (folder / MANIFEST).exists():
         progress(1, 1)
         return
-    pieces, paths = _pieces(folder, settings)
     run_pieces(_simulate_piece, shard.of(pieces), shard.of(paths), workers or default_workers(), progress)
 
 
@@ -108,7 +106,9 @@ def is_simulated(folder: Path) -> bool:
     return (folder / _SETTINGS).is_file()
 
 
-def _claim(folder: Path, settings: Settings) -> None:
+def _claim(folder: Path, settings: Settings) -> tuple[list[_Piece], list[Path]]:
+    """Say what is to be done and where it goes, in a folder that is marked with it; not before that is known."""
+    pieces = _pieces(folder, settings)
     if is_vacant(folder):
         write_text(folder / _SETTINGS, json.dumps(settings.model_dump(), indent=2) + "\n")
     elif not is_simulated(folder):
@@ -116,6 +116,7 @@ def _claim(folder: Path, settings: Settings) -> None:
     # Also after writing: another shard may have claimed the folder at the same moment.
     if read_settings(folder) != settings:
         raise ConfigError(f"{folder}: holds a simulation with other settings; choose another folder")
+    return pieces
 
 
 def _pieces(folder: Path, settings: Settings) -> tuple[list[_Piece], list[Path]]:

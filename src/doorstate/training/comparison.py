@@ -68,7 +68,8 @@ class Experiment(Frozen):
         try:
             return Recipe.model_validate(recipe.model_dump() | changes)
         except ValidationError as error:
-            raise ConfigError(f"experiment {self.name}: recipe_changes: {first_problem(error)}") from error
+            problem = first_problem(error, Recipe.model_fields)
+            raise ConfigError(f"experiment {self.name}: recipe_changes: {problem}") from error
 
     def heads_of(self, network: str) -> tuple[str, ...]:
         """The heads of a network: all, but "parts" only where it has features of single points."""
@@ -128,7 +129,7 @@ def load_experiment(path: Path | None, overrides: Mapping[str, Any]) -> Experime
     try:
         experiment = Experiment.model_validate(values | given)
     except ValidationError as error:
-        raise ConfigError(f"{path or 'options'}: {first_problem(error)}") from error
+        raise ConfigError(f"{path or 'options'}: {first_problem(error, Experiment.model_fields)}") from error
     experiment = experiment.model_copy(
         update={
             "recipe_changes": experiment.recipe_changes | wanted,
@@ -148,7 +149,7 @@ def read_study(path: Path, model: type[M]) -> M:
     try:
         return model.model_validate({"name": path.stem} | read_toml(path, "a study"))
     except ValidationError as error:
-        raise ConfigError(f"{path}: {first_problem(error)}") from error
+        raise ConfigError(f"{path}: {first_problem(error, model.model_fields)}") from error
 
 
 def read_toml(path: Path, what: str) -> dict[str, Any]:
