@@ -4,7 +4,8 @@
     python examples/train_own.py doors/pcd --out trained
 
 The folder has one folder for each state (open, semi-open, closed, in any usual spelling), at least thirty clouds in
-all and better a thousand. Stopped at any moment, the same command goes on from there.
+all and better a thousand. Stopped at any moment, the same command goes on from there. Clouds of most cameras need
+`--frame optical`; for depth images give `ReadOptions` their camera.
 """
 
 from __future__ import annotations
@@ -12,9 +13,9 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from doorstate import Predictor, read_cloud
+from doorstate import Predictor, ReadOptions, read_cloud
 from doorstate.cli.training import compare_live
-from doorstate.clouds.io import find_clouds
+from doorstate.clouds.io import UNITS_M, find_clouds
 from doorstate.console import progress_bar
 from doorstate.dataset.prepare import Preparation, prepare_dataset
 from doorstate.training.comparison import load_experiment
@@ -28,14 +29,19 @@ def main() -> None:
     )
     parser.add_argument("clouds", type=Path)
     parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--frame", default="body", choices=("body", "optical"))
+    parser.add_argument("--units", default="m", choices=tuple(UNITS_M))
     parser.add_argument("--network", default="pointnet2")
     parser.add_argument("--points", type=int, default=1024)
     parser.add_argument("--epochs", type=int, default=12)
     asked = parser.parse_args()
+    options = ReadOptions(frame=asked.frame, units_m=UNITS_M[asked.units])
 
     with progress_bar("Preparing") as progress:
         prepared = prepare_dataset(
-            Preparation(asked.clouds, asked.points), asked.out / "prepared", progress=progress
+            Preparation(asked.clouds, asked.points, options=options),
+            asked.out / "prepared",
+            progress=progress,
         )
     for row in prepared.rejected:
         print(f"left out {row['file']}: {row['reason']}")
@@ -56,7 +62,7 @@ def main() -> None:
     weights = run_of(asked.out / "comparison", asked.network, 0).weights
     print(f"weights: {weights}")
     first = find_clouds([asked.clouds])[0]
-    print(f"{first.name}: {Predictor.load(weights)(read_cloud(first)).state!r}")
+    print(f"{first.name}: {Predictor.load(weights)(read_cloud(first, options)).state!r}")
 
 
 if __name__ == "__main__":  # preparation starts processes, which import this file
