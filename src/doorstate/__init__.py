@@ -2,8 +2,8 @@
 """The state of a door from one depth-camera point cloud.
 
 The public names are `Predictor`, `Prediction`, `Gate`, `StateFilter`, `wait_for`, `DoorState`, `read_cloud`,
-`ReadOptions`, `create_network` and `list_networks`; each is imported when it is first used, so that `import doorstate` and the
-command line's help stay quick.
+`ReadOptions`, `create_network` and `list_networks`; each is imported when it is first used, so that `import doorstate`
+and the command line's help stay quick.
 """
 
 from __future__ import annotations
