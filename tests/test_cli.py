@@ -240,6 +240,8 @@ def test_depth_images_need_and_take_a_camera(run: Run, weights: Path, tmp_path: 
         (["predict", ".", "--rule", "plane_state", "--network", "dgcnn"], "one answers", 2),
         (["predict", ".", "--network", "dgcnn", "--weights", "x.safetensors"], "one answers", 2),
         (["predict", ".", "--rule", "plane_state", "--points", "1024"], "a rule looks at all points", 2),
+        (["predict", ".", "--points", "512", "--budget-ms", "33"], "give one of them", 2),
+        (["predict", ".", "--rule", "plane_state", "--budget-ms", "33"], "a rule looks at all points", 2),
         (["predict", ".", "--out", "cloud.npy/x.csv"], "cloud.npy/x.csv: cannot be written", 1),
         (["predict", ".", "--out", "states.txt"], "name a .csv or .jsonl file", 2),
         (["view", ".", "--out", "cloud.npy/x.html"], "cloud.npy/x.html: cannot be written", 1),

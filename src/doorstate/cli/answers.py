@@ -12,6 +12,7 @@ import typer
 
 from doorstate.cli.options import (
     Bag,
+    BudgetMs,
     CameraInfoTopic,
     DepthScale,
     Focal,
@@ -43,6 +44,7 @@ def predict(
     weights: Weights = None,
     rule: RuleName = None,
     points: PointCount = None,
+    budget_ms: BudgetMs = None,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object a line.")] = False,
     bag: Bag = None,
     topic: Topic = None,
@@ -67,6 +69,7 @@ def predict(
       doorstate predict --frame optical --json recordings/
       doorstate predict recordings/ --out states.csv
       doorstate predict --rule plane_state cloud.pcd
+      doorstate predict --network dgcnn --budget-ms 33 recordings/
       doorstate predict depth.png --fx 385.9 --fy 385.4 --cx 317.8 --cy 243.7
       doorstate predict depth.png --intrinsics camera_info.yaml --roll 90
       doorstate predict --bag run.bag --topic /camera/depth/points --frame optical --out run.csv
@@ -84,7 +87,7 @@ def predict(
         raise ConfigError(f"--out {out}: name a {' or '.join(WRITERS)} file")
     options = read_options(frame, roll, units, depth_scale, intrinsics, (fx, fy, cx, cy))
     found = find_clouds(files or [])
-    load = partial(load_predictor, network, weights, rule, points)
+    load = partial(load_predictor, network, weights, rule, points, budget_ms=budget_ms)
     if bag is None:
         _predict_files(load(), found, options, out, as_json)
     else:

@@ -47,6 +47,13 @@ RuleName = Annotated[
 PointCount = Annotated[
     int | None, typer.Option(help="Points to look at; as the weights ask for if not given.", min=128)
 ]
+BudgetMs = Annotated[
+    float | None,
+    typer.Option(
+        help="In place of --points: as many as this machine answers in so many milliseconds, measured now.",
+        min=1,
+    ),
+]
 Bag = Annotated[
     Path | None, typer.Option(help="A ROS recording in place of files: .bag, .db3, .mcap, or ROS 2 folder.")
 ]

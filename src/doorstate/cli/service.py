@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from doorstate.cli.options import Network, PointCount, RuleName, Weights
+from doorstate.cli.options import BudgetMs, Network, PointCount, RuleName, Weights
 from doorstate.errors import DoorstateError, not_installed
 
 # Longer than clients (httpx: 5 s) and proxies (nginx: 60 s) keep an idle connection. If the service closes it first, a
@@ -27,6 +27,7 @@ def serve(
     weights: Weights = None,
     rule: RuleName = None,
     points: PointCount = None,
+    budget_ms: BudgetMs = None,
     max_megabytes: Annotated[float, typer.Option(help="Larger files are refused.", min=0.001)] = 64.0,
     timeout_s: Annotated[
         float, typer.Option(help="From the head of a request to its answer; slower ones end.", min=0.1)
@@ -58,11 +59,11 @@ def serve(
     workers = workers or default_workers()
     limits = Limits(int(max_megabytes * 2**20), timeout_s, queue, workers)
     threads = max(1, default_workers() // workers)
-    predictor = load_predictor(network, weights, rule, points, threads=threads)
     if rule is None and (weights is None or weights.suffix != ".onnx"):
         import torch
 
         torch.set_num_threads(threads)
+    predictor = load_predictor(network, weights, rule, points, budget_ms=budget_ms, threads=threads)
     listening = _listen(host, port)
     server = uvicorn.Server(
         uvicorn.Config(
