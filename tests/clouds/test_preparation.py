@@ -166,6 +166,13 @@ def test_an_image_is_told_from_several_clouds() -> None:
         check_one_cloud(scan)
 
 
+@pytest.mark.parametrize("kept", [slice(None), slice(None, None, 7), slice(100, 3000)])
+def test_frames_in_the_order_of_their_pixels_are_no_image_either(kept: slice) -> None:
+    flat = image_of_a_rough_wall(60, 80).reshape(-1, 3)[kept]
+    for count in (2, 3, 8):
+        assert not is_image(np.stack([flat] * count))
+
+
 def farthest_first(points: Points, seed: int) -> Points:
     shuffled = np.random.default_rng(seed).permutation(points)
     return prepare_cloud(shuffled, 512).points

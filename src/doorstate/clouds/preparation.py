@@ -24,7 +24,7 @@ _NO_RETURN = 1e6  # in any unit; some drivers write FLT_MAX where nothing return
 _PIXELS_PER_POINT = 16  # that thinning leaves to choose from
 _UNITS_FROM_POINTS = 4096
 _OF_DEPTH = "(integer depth: --depth-scale)"
-_IMAGE_ROWS, _IMAGE_COLUMNS, _FEWEST_PAIRS = 16, 64, 64  # looked at, to see whether it is an image
+_IMAGE_LINES, _IMAGE_PLACES, _FEWEST_PAIRS = 16, 64, 24  # looked at, to see whether it is an image
 
 
 class PreparedCloud(NamedTuple):
@@ -121,23 +121,30 @@ def check_one_cloud(points: Points) -> Points:
 
 
 def is_image(cloud: NDArray[Any]) -> bool:
-    """Whether points (H, W, 3) are a camera's: rays of neighbours in a row are closer than those half a row apart.
+    """Whether points (H, W, 3) are a camera's: rays of neighbours are closer than those half an image apart.
 
-    True where too little was measured to tell.
+    In rows and in columns: clouds behind one another are alike down the columns, or unlike along the rows. True where
+    too little was measured to tell.
     """
-    rows = cloud[:: max(1, len(cloud) // _IMAGE_ROWS)].astype(np.float64)
-    columns = np.arange(0, rows.shape[1], max(1, rows.shape[1] // _IMAGE_COLUMNS))
+    return all(_is_scanned(lines) for lines in (cloud, np.swapaxes(cloud, 0, 1)))
+
+
+def _is_scanned(lines: NDArray[Any]) -> bool:
+    """Whether neighbours in a line are closer than points half a line apart."""
+    some = lines[:: max(1, len(lines) // _IMAGE_LINES)]
+    length = some.shape[1]
+    places = np.arange(0, length, max(1, length // _IMAGE_PLACES))
 
     def typical_turn(step: int) -> float:
-        here, there = rows[:, columns], rows[:, (columns + step) % rows.shape[1]]
+        here, there = (some[:, (places + add) % length].astype(np.float64) for add in (0, step))
         both = is_measured(here) & is_measured(there)
         here, there = here[both], there[both]
         if len(here) < _FEWEST_PAIRS:
             return np.nan
         lengths = np.linalg.norm(here, axis=1) * np.linalg.norm(there, axis=1)
-        return float(np.median(1 - (here * there).sum(axis=1) / lengths))
+        return max(0.0, float(np.median(1 - (here * there).sum(axis=1) / lengths)))
 
-    return not typical_turn(1) > 0.5 * typical_turn(rows.shape[1] // 2)
+    return not typical_turn(1) >= 0.5 * typical_turn(length // 2)
 
 
 def is_measured(points: NDArray[np.floating[Any]]) -> NDArray[np.bool_]:
