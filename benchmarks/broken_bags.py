@@ -73,7 +73,7 @@ class Recordings:
         together, metadata = self._folder / "together", []
         together.mkdir()
         for kind, compression in _FOLDERS:
-            messages = self._messages(np.random.default_rng(0))
+            messages = self._messages(np.random.default_rng(2))
             folder = write_bag(self._folder / f"{kind}{compression}", kind, messages, compression)
             (store,) = folder.glob(f"{folder.name}.*")
             name = f"{compression}{store.name}"

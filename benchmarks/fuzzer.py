@@ -57,7 +57,9 @@ OUTCOMES = ("answered", "no state", "refused", "crash", "hang", "memory", "answe
 FAILURES = OUTCOMES[3:]
 BAG_FOLDER, CAMERA, NAME, SERVICE = "metadata.yaml", "camera file", "file name", "service"
 TARGETS = (*CLOUD_SUFFIXES, NAME, CAMERA, *MESSAGES, *BAG_SUFFIXES, BAG_FOLDER, SERVICE)
-_EVERY_EIGHTH = Pinhole(69.28, 69.28, 39.94, 29.94)  # pixel of 640 x 480, 60 degrees: the scene's camera
+# Of images with every so-many-th pixel of 640 x 480, 60 degrees: the scene's camera and that of recordings.
+_EVERY_EIGHTH = Pinhole(69.28, 69.28, 39.94, 29.94)
+_EVERY_32ND = Pinhole(17.32, 17.32, 9.98, 7.48)
 _STATUSES = {200, 400, 404, 405, 413, 415, 422}  # that one client at a time may get
 _COUNTED = 100_000  # points that are looked through for equal ones
 
@@ -138,7 +140,8 @@ class Fuzzer:
     def _judge(self, rng: np.random.Generator, target: str, given: Any) -> Outcome:
         if target == SERVICE:
             return self._runner.run(self._post(rng, *given))
-        options = _draw_options(rng)
+        recorded = target in BAG_SUFFIXES or target == BAG_FOLDER
+        options = _draw_options(rng, _EVERY_32ND if recorded else _EVERY_EIGHTH)
         if target in MESSAGES:
             return self._of_points(points_from_message(given, f"sensor_msgs/msg/{target}", options))
         suffix, content = given
@@ -232,11 +235,11 @@ def draw_suffix(target: str, rng: np.random.Generator) -> str:
     return str(rng.choice(several[target])) if target in several else target
 
 
-def _draw_options(rng: np.random.Generator) -> ReadOptions:
+def _draw_options(rng: np.random.Generator, camera: Pinhole) -> ReadOptions:
     return ReadOptions(
         frame="optical" if rng.random() < 0.2 else "body",
         roll_deg=int(rng.choice([0, 90, 180, 270])) if rng.random() < 0.2 else 0,
-        intrinsics=_EVERY_EIGHTH if rng.random() < 0.8 else None,
+        intrinsics=camera if rng.random() < 0.8 else None,
         units_m=0.001 if rng.random() < 0.1 else 1.0,
     )
 

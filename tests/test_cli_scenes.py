@@ -28,7 +28,7 @@ def test_scenes_in_shares_and_as_worlds(run: Run, tmp_path: Path) -> None:
     assert sorted(path.name for path in worlds.iterdir()) == [f"{names[0]}.sdf", f"{names[8]}.sdf"]
     assert ET.parse(worlds / f"{names[8]}.sdf").getroot().tag == "sdf"
     code, _, err = run("export-sdf", folder, "no-door-0-00009-no_door", "--out", tmp_path / "none")
-    assert code == 1
+    assert code == 2
     assert err.count("\n") == 1
     assert "holds no sample 'no-door-0-00009-no_door'" in err
     assert not (tmp_path / "none").exists()
@@ -47,7 +47,7 @@ def test_what_cannot_be_simulated_is_one_line(run: Run, tmp_path: Path) -> None:
         (("--preset", "varied", "--shard", "3/2"), "--shard 3/2: give the share"),
     ):
         code, _, err = run("simulate", "--out", tmp_path / "x", *options)
-        assert code == 1
+        assert code == 2
         assert err.startswith("doorstate: ")
         assert reason in err
         assert err.count("\n") == 1

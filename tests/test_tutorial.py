@@ -96,6 +96,8 @@ def test_arrays_are_turned_as_shown(
     files: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(files)
-    (block,) = re.findall(r"```python\n(.*?)```", INPUTS, flags=re.DOTALL)
-    exec(compile(block, "docs/inputs.md", "exec"), {})
+    of_files, of_arrays = re.findall(r"```python\n(.*?)```", INPUTS, flags=re.DOTALL)
+    exec(compile(of_arrays, "docs/inputs.md", "exec"), {})
     assert "state=<DoorState.OPEN: 2>" in capsys.readouterr().out
+    exec(compile(of_files, "docs/inputs.md", "exec"), {})
+    assert "Prediction(state=" in capsys.readouterr().out
