@@ -59,6 +59,11 @@ def test_where_nothing_can_be_written_is_one_line_before_and_when_it_is_tried(tm
             write_text(target, "text")
 
 
+def test_asking_whether_something_can_be_written_makes_nothing(tmp_path: Path) -> None:
+    check_writable(tmp_path / "new" / "folder" / "page.html")
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_full_disk_is_one_line_and_another_missing_file_is_itself(tmp_path: Path) -> None:
     refused = pytest.raises(OutputError, match=r"a\.txt: cannot be written \(No space left on device\)")
     with refused, atomic_path(tmp_path / "a.txt"):

@@ -21,6 +21,7 @@ def atomic_path(target: Path) -> Iterator[Path]:
         OutputError: it cannot be written.
     """
     check_writable(target)
+    target.parent.mkdir(parents=True, exist_ok=True)
     # The target's ending stays last: writers such as numpy and matplotlib choose the format by it.
     temporary = target.with_name(f".{os.getpid()}.tmp.{target.name}")
     try:
@@ -36,18 +37,21 @@ def atomic_path(target: Path) -> Iterator[Path]:
 
 
 def check_writable(target: Path) -> None:
-    """Make the folder of a file to be written; what is asked before long work is not learned after it.
+    """Ask before long work, and change nothing, whether a file and the folders above it could be made.
 
     Raises:
-        OutputError: there can be no such folder, or nothing may be written into it.
+        OutputError: it is a folder, or the nearest thing above it that exists is none or may not be written into.
     """
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"{target}: cannot be written ({error.strerror or error})") from error
-    if target.is_dir() or not os.access(target.parent, os.W_OK):
-        reason = "it is a folder" if target.is_dir() else "nothing may be written into its folder"
-        raise OutputError(f"{target}: cannot be written ({reason})")
+    above = next(folder for folder in target.absolute().parents if os.path.lexists(folder))
+    if target.is_dir():
+        reason = "it is a folder"
+    elif not above.is_dir():
+        reason = f"{above} is no folder"
+    elif not os.access(above, os.W_OK):
+        reason = f"nothing may be written into {above}"
+    else:
+        return
+    raise OutputError(f"{target}: cannot be written ({reason})")
 
 
 def is_vacant(folder: Path) -> bool:

@@ -133,8 +133,6 @@ def _methods(
     from doorstate.deployment.loading import load_predictor
     from doorstate.deployment.predictor import DEFAULT_NETWORK
 
-    if points is not None and rules and not (networks or weights):
-        raise ConfigError("a rule looks at all points: leave --points out")
     asked: list[tuple[str | None, Path | None, str | None]] = [
         *((name, None, None) for name in networks or ()),
         *((None, path, None) for path in weights or ()),
@@ -145,8 +143,9 @@ def _methods(
         raise ConfigError(
             f"{twice[0]} is asked for twice: name each method once, and weights files differently"
         )
+    mixed = networks or weights  # rules beside them look at all points
     return {
-        name: load_predictor(network, path, rule, None if rule else points)
+        name: load_predictor(network, path, rule, None if rule and mixed else points)
         for name, (network, path, rule) in zip(names, asked, strict=True)
     }
 

@@ -169,19 +169,14 @@ def report(
     from doorstate.dataset.store import is_prepared
     from doorstate.evaluation.report import write_dataset_figures, write_everything
 
-    compared = [(folder / "comparison.json").is_file() for folder in folders]
-    for folder, is_compared in zip(folders, compared, strict=True):
-        if not is_compared and (len(folders) > 1 or not is_prepared(folder)):
-            raise DatasetError(
-                f"{folder}: holds no comparison (doorstate compare) and is no prepared data set on its own"
-            )
+    alone = len(folders) == 1 and not (folders[0] / "comparison.json").is_file()
+    if alone and not is_prepared(folders[0]):
+        raise DatasetError(
+            f"{folders[0]}: holds no comparison (doorstate compare) and no prepared data set (doorstate prepare)"
+        )
     target = out or folders[0] / "report"
     with err.status("Writing the report"):
-        page = (
-            write_everything(folders, target, data)
-            if all(compared)
-            else write_dataset_figures(folders[0], target)
-        )
+        page = write_dataset_figures(folders[0], target) if alone else write_everything(folders, target, data)
     stdout.print(f"report: {page}", soft_wrap=True)
 
 

@@ -24,7 +24,7 @@ _NO_RETURN = 1e6  # in any unit; some drivers write FLT_MAX where nothing return
 _PIXELS_PER_POINT = 16  # that thinning leaves to choose from
 _UNITS_FROM_POINTS = 4096
 _OF_DEPTH = "(integer depth: --depth-scale)"
-_IMAGE_LINES, _IMAGE_PLACES, _FEWEST_PAIRS = 16, 64, 24  # looked at, to see whether it is an image
+_IMAGE_LINES, _IMAGE_PLACES, _FEWEST_PAIRS = 8, 32, 12  # looked at, to see whether it is an image
 
 
 class PreparedCloud(NamedTuple):
@@ -72,14 +72,13 @@ def prepare_cloud(
         raise TooFewPointsError(f"too few points: {len(clean)} measured, at least {MIN_POINTS} are needed")
     _check_units(clean)
     if max_depth_m is not None:
-        measured = measured[clean[:, 0] <= max_depth_m]
-        clean = flat[measured]
-        if len(clean) < MIN_POINTS:
-            median_m = _median_range(flat[is_measured(flat)])
+        near = clean[:, 0] <= max_depth_m
+        if near.sum() < MIN_POINTS:
             raise TooFewPointsError(
-                f"too few points: {len(clean)} within {max_depth_m:g} m ahead, at least {MIN_POINTS} are needed; "
-                f"half of all are more than {median_m:.1f} m away"
+                f"too few points: {near.sum()} within {max_depth_m:g} m ahead, at least {MIN_POINTS} are needed; "
+                f"half of all are more than {_median_range(clean):.1f} m away"
             )
+        measured, clean = measured[near], clean[near]
     chosen = _without_repeats(farthest_point_indices(clean, min(count, len(clean))))
     if len(chosen) < min(count, MIN_POINTS):
         raise TooFewPointsError(
