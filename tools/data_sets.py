@@ -20,6 +20,8 @@ SIMULATED = {
     "cluttered-kinect": "--preset cluttered --scenes 1200 --seed 14 --sensor kinect",
     "no-door-xtion": "--preset no-door --scenes 1000 --seed 15 --sensor xtion",
     "no-door-d435": "--preset no-door --scenes 800 --seed 16 --sensor d435",
+    "no-door-kinect": "--preset no-door --scenes 1000 --seed 17 --sensor kinect",
+    "no-door-deepdoors2": "--preset no-door --scenes 500 --seed 18 --sensor deepdoors2",
     # To test on: the same doors, whatever measures them.
     **{
         f"test-{name}": f"--preset varied --scenes 200 --seed 21 --sensor {sensor}"
@@ -32,6 +34,7 @@ SIMULATED = {
     "test-cluttered": "--preset cluttered --scenes 600 --seed 23 --sensor xtion",
 }
 JOINED = {
+    # Every camera sees doors and walls without one: what a camera looks like must not tell them apart.
     "mixture": (
         "varied-xtion",
         "varied-d435",
@@ -39,6 +42,8 @@ JOINED = {
         "cluttered-kinect",
         "no-door-xtion",
         "no-door-d435",
+        "no-door-kinect",
+        "no-door-deepdoors2",
     ),
 }
 # The D435 sees 10 m, all others 5 or less. Doors are within 3.5 m, and farthest-point sampling spends its points on

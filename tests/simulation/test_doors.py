@@ -128,7 +128,11 @@ def test_passable_widths_are_those_of_a_tape_measure() -> None:
     both = passable_width_m(double, Opening(angle_deg=90, passive_angle_deg=90))
     assert both == pytest.approx(1.6 - 2 * 0.043)
     sliding = VariedDoor(kind="sliding", leaf_recess_m=-0.06, stop_width_m=0.0)
-    assert passable_width_m(sliding, Opening(share=0.5)) == pytest.approx(0.45)
+    # The leaf runs in front of the wall and is 0.03 m wider than the opening on each side.
+    assert passable_width_m(sliding, Opening(share=0.5)) == pytest.approx(0.42)
+    assert passable_width_m(sliding, Opening(share=0.02)) == 0
+    in_the_wall = sliding.model_copy(update={"leaf_recess_m": 0.05})
+    assert passable_width_m(in_the_wall, Opening(share=0.5)) == pytest.approx(0.45)
 
 
 @pytest.mark.parametrize("door", DOORS, ids=lambda door: door.kind)

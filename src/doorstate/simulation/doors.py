@@ -97,7 +97,7 @@ def passable_width_m(door: VariedDoor, opening: Opening) -> float:
     """
     width = door.opening_width_m
     if door.is_sliding:
-        return opening.share * width
+        return max(0.0, opening.share * width - _overlap_m(door))
     jamb = Box(
         Part.FRAME,
         (width / 2 + door.jamb_thickness_m / 2, -door.wall_thickness_m / 2, 1.0),
@@ -198,10 +198,14 @@ def _full_glass(slab: Box) -> list[Box]:
     ]
 
 
+def _overlap_m(door: VariedDoor) -> float:
+    """By which a sliding leaf that runs in front of the wall covers it on each side."""
+    return SLIDING_OVERLAP_M if door.leaf_recess_m < 0 else 0.0
+
+
 def _sliding_leaf(door: VariedDoor) -> list[Box]:
     """Closed; with a bar on the face that never meets the wall, if the leaf runs in front of it."""
-    in_front = door.leaf_recess_m < 0
-    overlap = SLIDING_OVERLAP_M if in_front else 0.0
+    overlap = _overlap_m(door)
     bottom = door.threshold_m + door.leaf_floor_gap_m
     height = door.opening_height_m + overlap - bottom
     width = door.opening_width_m + 2 * overlap
