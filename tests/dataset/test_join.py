@@ -78,5 +78,9 @@ def test_what_cannot_be_joined_is_refused(
         join_datasets([varied, varied], tmp_path / "a")
     with pytest.raises(ConfigError, match=r"has 40 points a cloud, .* has 160"):
         join_datasets([varied, prepared], tmp_path / "b")
+    shutil.copytree(scene_dataset.folder.parent / "no-door-160", tmp_path / "thin")
+    open_dataset(varied).description.model_copy(update={"thin": True, "samples": 12}).save(tmp_path / "thin")
+    with pytest.raises(ConfigError, match="one was prepared with --thin; prepare one anew"):
+        join_datasets([varied, tmp_path / "thin"], tmp_path / "b")
     with pytest.raises(ConfigError, match="exists and holds something"):
         join_datasets([varied], varied)

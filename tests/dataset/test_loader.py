@@ -68,6 +68,14 @@ def test_an_epoch_shows_clouds_once_and_leaves_out_what_fills_no_batch(
     assert len(places) == len(set(places)) == clouds
 
 
+def test_an_epoch_of_a_few_clouds_draws_others_every_time(loader: CloudLoader) -> None:
+    epochs = [list(loader.shuffled(2, NOTHING, (0, 0, epoch), limit=5)) for epoch in range(20)]
+    assert {len(epoch) for epoch in epochs} == {2}
+    assert {place for epoch in epochs for place in found_in(loader, epoch)} == set(range(11))
+    later = list(loader.shuffled(2, NOTHING, (0, 0, 7), skip=1, limit=5))
+    assert [torch.equal(a.points, b.points) for a, b in zip(epochs[7][1:], later, strict=True)] == [True]
+
+
 def test_over_epochs_no_cloud_is_left_out_for_good(loader: CloudLoader) -> None:
     seen = [set(found_in(loader, list(loader.shuffled(4, NOTHING, (0, 0, epoch))))) for epoch in range(12)]
     assert set.union(*seen) == set(range(11))

@@ -164,6 +164,22 @@ def test_clouds_end_where_they_are_told_to(tiny_simulation: Path, tmp_path: Path
         prepare_dataset(asked._replace(max_depth_m=2.0), tmp_path / "near", workers=1)
 
 
+def test_thinned_clouds_are_those_that_a_predictor_samples(tiny_simulation: Path, tmp_path: Path) -> None:
+    asked = Preparation(tiny_simulation, NUM_POINTS, thin=True)
+    thinned = prepare_dataset(asked, tmp_path / "thin", workers=1).dataset
+    assert thinned.description.thin
+    for index in (0, 7):
+        expected = prepare_cloud(thinned.raw_cloud(index), NUM_POINTS, thin=True)
+        every = prepare_cloud(thinned.raw_cloud(index), NUM_POINTS)
+        np.testing.assert_array_equal(thinned.cloud(index), expected.points)
+        assert not np.array_equal(expected.points, every.points)
+    shutil.copy(tmp_path / "thin" / MANIFEST, tmp_path)
+    thinned.description.model_copy(update={"clouds": "replayed"}).save(tmp_path)
+    np.testing.assert_array_equal(open_dataset(tmp_path).cloud(7), thinned.cloud(7))
+    with pytest.raises(ConfigError, match="preparation of something else"):
+        prepare_dataset(asked._replace(thin=False), tmp_path / "thin", workers=1)
+
+
 @pytest.mark.parametrize(
     ("column", "value", "message"),
     [

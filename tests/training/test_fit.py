@@ -22,7 +22,7 @@ from doorstate.files import read_csv
 from doorstate.networks.pointnet2 import PointNet2
 from doorstate.training import fit as fit_module
 from doorstate.training.fit import RunConfig, fit
-from doorstate.training.recipes import Recipe, Stage
+from doorstate.training.recipes import Recipe, Stage, learning_rate
 from doorstate.training.weights import load_weights
 
 RECIPE = Recipe(
@@ -260,6 +260,26 @@ def test_every_network_trains_with_its_authors_recipe(
     recipe = AUTHORS[name].model_copy(update={"epochs": 1, "batch_size": 8})
     metrics = fit(config(network=name, recipe=recipe), small_dataset, roles, tmp_path / "run")
     assert 0 <= metrics["test_macro_f1"] <= 1
+
+
+def test_a_limit_of_clouds_makes_epochs_shorter_and_the_schedule_with_them(
+    small_dataset: PreparedDataset,
+    roles: dict[str, Role],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    rates: list[float] = []
+    step = fit_module._Trainer._step
+
+    def counted(self: Any, batch: Any) -> float:
+        rates.append(self.optimizer.param_groups[0]["lr"])
+        return step(self, batch)
+
+    monkeypatch.setattr(fit_module._Trainer, "_step", counted)
+    recipe = RECIPE.model_copy(update={"clouds_per_epoch": 2 * RECIPE.batch_size + 1})
+    fit(config(recipe=recipe), small_dataset, roles, tmp_path / "run")
+    assert len(rates) == 2 * RECIPE.epochs
+    assert rates == [learning_rate(recipe, each, 2, 128) for each in range(len(rates))]
 
 
 @pytest.mark.parametrize(("scale", "kept"), [((1.0, 1.0), True), ((0.9, 1.1), False)])

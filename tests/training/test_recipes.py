@@ -39,6 +39,12 @@ def test_the_common_recipe_differs_in_length_and_batch_and_ends_on_everything(ne
     assert find_recipe("common", "mvcnn") == COMMON
 
 
+def test_a_recipe_without_a_limit_is_written_as_before_there_was_one() -> None:
+    limited = COMMON.model_copy(update={"clouds_per_epoch": 100})
+    assert "clouds_per_epoch" not in COMMON.model_dump(mode="json")
+    assert Recipe.model_validate(limited.model_dump(mode="json")) == limited != COMMON
+
+
 @pytest.mark.parametrize("name", ["typo", "Common", ""])
 def test_an_unknown_recipe_is_named(name: str) -> None:
     with pytest.raises(ConfigError, match="choose common or authors"):

@@ -131,12 +131,19 @@ def prepare(
         float | None,
         typer.Option("--max-depth-m", help="Leave out points farther ahead, in metres.", min=0.5),
     ] = None,
+    thin: Annotated[
+        bool,
+        typer.Option(
+            "--thin", help="Sample from every second, third ... row and column of images, as predict does."
+        ),
+    ] = False,
 ) -> None:
     """Clean clouds and bring them into farthest-point order, ready for training.
 
     \b
     Examples:
       doorstate prepare data/ogurob --out data/ogurob-4096
+      doorstate prepare data/varied --thin --max-depth-m 5 --out data/varied-4096
       doorstate prepare data/varied --shard 2/8 --out data/varied-4096
       doorstate prepare DeepDoors2 --layout deepdoors2 --out data/deepdoors2
       doorstate prepare ~/OGUROB_DOORS --poses poses.csv --frame optical --out data/original
@@ -150,7 +157,7 @@ def prepare(
     options = read_options(frame, roll, units, depth_scale, intrinsics, (fx, fy, cx, cy), layout)
     if layout is not None and poses is not None:
         raise ConfigError("--poses is for class folders: leave it out with --layout")
-    asked = Preparation(source, points, poses, options, layout, max_depth)
+    asked = Preparation(source, points, poses, options, layout, max_depth, thin)
     if shard is not None:
         share = Shard.parse(shard)
         with progress_bar("Preparing") as progress:

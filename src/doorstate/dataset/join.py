@@ -38,6 +38,8 @@ def join_datasets(sources: Sequence[Path], folder: Path) -> PreparedDataset:
             raise ConfigError(
                 f"{source}: has {dataset.num_points} points a cloud, {sources[0]} has {num_points}; prepare one anew"
             )
+        if dataset.description.thin != datasets[0].description.thin:
+            raise ConfigError(f"{source} and {sources[0]}: one was prepared with --thin; prepare one anew")
     rows = [row for dataset in datasets for row in dataset.rows]
     name, count = Counter(row["sample_id"] for row in rows).most_common(1)[0]
     if count > 1:
@@ -58,6 +60,7 @@ def join_datasets(sources: Sequence[Path], folder: Path) -> PreparedDataset:
         num_points=num_points,
         samples=len(rows),
         max_depth_m=None if None in limits_m else max(limit_m for limit_m in limits_m if limit_m),
+        thin=datasets[0].description.thin,
         doorstate_version=__version__,
     ).save(folder)
     return open_dataset(folder)

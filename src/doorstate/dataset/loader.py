@@ -91,14 +91,22 @@ class CloudLoader:
             yield self._batch(np.arange(start, min(start + batch_size, len(self))), None)
 
     def shuffled(
-        self, batch_size: int, augmentation: Augmentation, seed: Sequence[int], skip: int = 0
+        self,
+        batch_size: int,
+        augmentation: Augmentation,
+        seed: Sequence[int],
+        skip: int = 0,
+        limit: int | None = None,
     ) -> Iterator[Batch]:
-        """One training epoch: shuffled, augmented, an incomplete last batch and the first `skip` left out."""
+        """One training epoch: shuffled, augmented, an incomplete last batch and the first `skip` left out.
+
+        With a limit an epoch is so many clouds, drawn anew, and not all.
+        """
         rng = np.random.default_rng(seed)
-        order = rng.permutation(len(self))
-        batch_size = min(batch_size, len(self))
+        order = rng.permutation(len(self))[:limit]
+        batch_size = min(batch_size, len(order))
         num_points = self._points.shape[1]
-        for number, start in enumerate(range(0, len(self) - batch_size + 1, batch_size)):
+        for number, start in enumerate(range(0, len(order) - batch_size + 1, batch_size)):
             draw = draw_augmentation(augmentation, rng, batch_size, num_points)
             if number >= skip:
                 yield self._batch(order[start : start + batch_size], draw)

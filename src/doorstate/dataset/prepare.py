@@ -59,6 +59,7 @@ class Preparation(NamedTuple):
     options: ReadOptions = ReadOptions()  # what the files do not say of themselves
     layout: str | None = None  # of another's folders (`dataset.layouts`)
     max_depth_m: float | None = None  # leave out what lies farther ahead, as of `clouds.preparation`
+    thin: bool = False  # look at some rows and columns of images only, likewise
 
     @property
     def simulated(self) -> bool:
@@ -91,6 +92,7 @@ class Preparation(NamedTuple):
             "rows": hashlib.sha256(json.dumps(rows).encode()).hexdigest(),
             **({} if self.layout is None else {"layout": self.layout}),
             **({} if self.max_depth_m is None else {"max_depth_m": self.max_depth_m}),
+            **({"thin": True} if self.thin else {}),
         }
         return json.dumps(settings, indent=2) + "\n"
 
@@ -137,6 +139,7 @@ def prepare_dataset(
         source=name,
         num_points=asked.num_points,
         max_depth_m=asked.max_depth_m,
+        thin=asked.thin,
         samples=len(rows) - len(rejected),
         doorstate_version=__version__,
     ).save(folder)
@@ -215,7 +218,7 @@ def _prepare_piece(piece: _Piece, path: Path) -> None:
                 parts.append(part)
             else:
                 raw = read(asked.source / row["file"], asked.options)
-                cloud = exactly(raw, asked.num_points, asked.max_depth_m)[0]
+                cloud = exactly(raw, asked.num_points, asked.max_depth_m, asked.thin)[0]
             clouds.append(cloud)
             reasons.append("")
         except (CloudError, CameraError) as error:
@@ -236,7 +239,7 @@ def _from_simulation(row: dict[str, str], asked: Preparation) -> tuple[Points, n
         raise DatasetError(
             f"{sample.sample_id}: renders differently than its manifest says; simulate it again here"
         )
-    return sample_frame(frame, asked.num_points, asked.max_depth_m)
+    return sample_frame(frame, asked.num_points, asked.max_depth_m, asked.thin)
 
 
 def _release(folder: Path) -> None:

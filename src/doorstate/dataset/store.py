@@ -39,6 +39,7 @@ class DatasetDescription(Frozen):
     doorstate_version: str
     clouds: Literal["stored", "replayed"] = "stored"  # replayed: from the rows of a simulated data set
     max_depth_m: float | None = None  # what lay farther ahead was left out
+    thin: bool = False  # chosen from some rows and columns of each image, as a predictor does
 
     def save(self, folder: Path) -> None:
         """Write it; the folder counts as complete from here on."""
@@ -148,7 +149,7 @@ class PreparedDataset:
             _keep(
                 self._made,
                 index,
-                sample_frame(self._frame(index), count, self.description.max_depth_m),
+                sample_frame(self._frame(index), count, self.description.max_depth_m, self.description.thin),
                 _KEPT_CLOUDS,
             )
         points, parts = self._made[index]

@@ -265,7 +265,7 @@ class _Trainer:
     def _epoch(self, epoch: int, loader: CloudLoader) -> tuple[float, float]:
         config, recipe = self.config, self.config.recipe
         torch.manual_seed(_seed(config, epoch + 1))  # dropout
-        per_epoch = max(1, len(loader) // recipe.batch_size)
+        per_epoch = max(1, min(len(loader), recipe.clouds_per_epoch or len(loader)) // recipe.batch_size)
         losses: list[float] = []
         if self.begun is not None:
             losses, generator = self.begun
@@ -275,7 +275,11 @@ class _Trainer:
         rate = 0.0
         told = saved = time.perf_counter()
         batches = loader.shuffled(
-            recipe.batch_size, recipe.augmentation, (config.seed, config.fold, epoch), skip=len(losses)
+            recipe.batch_size,
+            recipe.augmentation,
+            (config.seed, config.fold, epoch),
+            skip=len(losses),
+            limit=recipe.clouds_per_epoch,
         )
         for iteration, batch in enumerate(batches, start=epoch * per_epoch + len(losses)):
             rate = learning_rate(recipe, iteration, per_epoch, config.num_points)

@@ -4,9 +4,9 @@
 from __future__ import annotations
 
 import math
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
-from pydantic import Field
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer
 
 from doorstate.clouds.augment import Augmentation
 from doorstate.clouds.preparation import NUM_POINTS
@@ -34,6 +34,7 @@ class Recipe(Frozen):
 
     name: str
     epochs: int = Field(default=30, ge=0)  # 0 tests the weights that a run starts from
+    clouds_per_epoch: int | None = Field(default=None, ge=2)  # drawn anew for every epoch; None is all
     batch_size: int = Field(default=16, ge=2)
     optimizer: Literal["adamw", "adam", "sgd"] = "adamw"
     learning_rate: float = Field(default=2e-3, gt=0)
@@ -54,6 +55,13 @@ class Recipe(Frozen):
     coarse_to_fine: tuple[Stage, ...] = ()  # what the shares leave is trained on all points and centres
     precision: Literal["auto", "fp32", "bf16"] = "auto"
     compile: bool = False  # torch.compile; docs/speed.md has what it brings
+
+    @model_serializer(mode="wrap")
+    def _without_what_is_not_given(self, fields: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        # Runs that were begun before there was a limit go on.
+        return {
+            name: value for name, value in fields(self).items() if (name, value) != ("clouds_per_epoch", None)
+        }
 
 
 # Yaw stays near the true heading: the frame is the sensor's and its x axis is where the robot looks. Nothing moves
