@@ -20,6 +20,7 @@ from statistics import median
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from published import rows_of
 from results_page import NAMES
 from studies import Asked, read_asked, resolution_results, study_table
@@ -33,14 +34,14 @@ from doorstate.evaluation.factors import factors_table, kinds_table
 from doorstate.evaluation.head_tables import answers_table, presence_table
 from doorstate.evaluation.metrics import scores
 from doorstate.evaluation.resolution import fewest_points
-from doorstate.evaluation.results import ComparisonResults, load_results
+from doorstate.evaluation.results import Answers, ComparisonResults, Predictions, load_results
 from doorstate.evaluation.score_tables import pooled_confusion
 from doorstate.evaluation.table import Table
 from doorstate.files import write_text
 from doorstate.training.calibration import abstain_threshold, at_temperature
 from doorstate.training.run_folder import read_json, run_of
 from doorstate.training.weights import load_weights, save_weights
-from doorstate.types import STATES
+from doorstate.types import STATES, SURE
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 RESULTS, EXPERIMENTS = REPOSITORY / "results", REPOSITORY / "experiments"
@@ -166,7 +167,10 @@ def _of_weights(experiment: str) -> Callable[[str], Evidence]:
         temperature = round(calibrated.temperatures[0], 4)
         validated = at_temperature(run.validation.probabilities, temperature)
         threshold = abstain_threshold(validated, run.validation.true, _WRONG_SHARE)
-        answered = calibrated.scaled.max(axis=1) >= threshold
+        given = results.answers(network)
+        answered = (calibrated.scaled.max(axis=1) >= threshold) & _seems_a_door(
+            results.pooled(network), given
+        )
         right = calibrated.scaled.argmax(axis=1) == calibrated.true
         tables = [
             make(results, dataset) for make in (answers_table, presence_table, kinds_table, factors_table)
@@ -187,6 +191,14 @@ def _of_weights(experiment: str) -> Callable[[str], Evidence]:
         )
 
     return evidence
+
+
+def _seems_a_door(pooled: Predictions, given: Answers | None) -> NDArray[np.bool_]:
+    """Of which samples a predictor would not say that there is no door."""
+    if given is None or "p_door" not in given.columns:
+        return np.ones(len(pooled), bool)
+    p_door = dict(zip(given.sample_ids, given.columns["p_door"], strict=True))
+    return np.array([p_door[sample] >= SURE for sample in pooled.sample_ids])
 
 
 def _studies(experiment: str) -> Iterator[Asked]:

@@ -33,7 +33,7 @@ from doorstate.errors import (
 )
 from doorstate.rules.base import Shape
 from doorstate.training.card import WeightsCard
-from doorstate.types import STATES, DoorState, Points
+from doorstate.types import STATES, SURE, DoorState, Points
 
 if TYPE_CHECKING:
     from doorstate.networks.base import PointNetwork
@@ -41,7 +41,6 @@ if TYPE_CHECKING:
 DEFAULT_NETWORK = "pointnet2"
 DEFAULT_GATE = Gate()
 BUDGET_POINTS = (256, 512, 1024, 2048, 4096)  # what a time budget is spent on
-_SURE = 0.5  # from here on a probability is a yes
 _BUDGET_REPEATS = 5  # of each, after one that warms up
 
 
@@ -257,7 +256,7 @@ class Predictor:
         best, told = int(said.probabilities.argmax()), said.told
         sure, p_door = float(said.probabilities[best]), told.get("p_door")
         reason = ""
-        if p_door is not None and p_door < _SURE:
+        if p_door is not None and p_door < SURE:
             reason = f"there seems to be no door: the probability of one is {p_door:.2f}"
         elif sure < self.card.abstain_below:
             label, least = DoorState(best).label, self.card.abstain_below
@@ -292,7 +291,7 @@ class _Said(NamedTuple):
 def _hinge(told: Mapping[str, float]) -> Literal["left", "right"] | None:
     if "p_hinge_left" not in told:
         return None
-    return "left" if told["p_hinge_left"] >= _SURE else "right"
+    return "left" if told["p_hinge_left"] >= SURE else "right"
 
 
 def _frame(told: Mapping[str, float]) -> DoorFrame | None:

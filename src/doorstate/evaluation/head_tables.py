@@ -14,9 +14,8 @@ from doorstate.evaluation.results import Answers, ComparisonResults
 from doorstate.evaluation.stratum_tables import rows_of
 from doorstate.evaluation.table import Table, number
 from doorstate.simulation.manifest import numbers
-from doorstate.types import NO_DOOR, Part
+from doorstate.types import NO_DOOR, SURE, Part
 
-_SURE = 0.5  # from here on a probability is a yes
 _ERRORS = {
     "door, AUROC": 4,
     "opening angle, semi-open: mean error, °": 1,
@@ -67,7 +66,7 @@ def answer_errors(given: Answers, dataset: PreparedDataset) -> dict[str, float]:
     hinge = np.array([row.get("hinge") or row.get("door.hinge", "") for row in manifest])
     said_left = given.columns.get("p_hinge_left", np.full(len(state), math.nan))
     hinge_right = np.where(
-        (hinge != "") & ~np.isnan(said_left), (said_left >= _SURE) == (hinge == "left"), math.nan
+        (hinge != "") & ~np.isnan(said_left), (said_left >= SURE) == (hinge == "left"), math.nan
     )
     place = np.hypot(off("door_x_m"), off("door_y_m"))
     turn = np.abs(
@@ -98,7 +97,7 @@ def presence_table(results: ComparisonResults, dataset: PreparedDataset) -> Tabl
         manifest = rows_of(dataset, given)
         kinds = np.array([row.get("door_kind") or row.get("scene_kind", "") for row in manifest])
         doors = np.array([row["state"] != NO_DOOR for row in manifest])
-        said = given.columns["p_door"] >= _SURE
+        said = given.columns["p_door"] >= SURE
         for is_door, name in ((True, "yes"), (False, "no")):
             for kind in sorted(set(kinds[doors == is_door])):
                 chosen = (doors == is_door) & (kinds == kind)
