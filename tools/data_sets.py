@@ -22,6 +22,8 @@ SIMULATED = {
     "no-door-d435": "--preset no-door --scenes 600 --seed 16 --sensor d435",
     "no-door-kinect": "--preset no-door --scenes 600 --seed 17 --sensor kinect",
     "no-door-deepdoors2": "--preset no-door --scenes 300 --seed 18 --sensor deepdoors2",
+    "varied-clean": "--preset varied --scenes 400 --seed 19",
+    "no-door-clean": "--preset no-door --scenes 200 --seed 20",
     # To test on: the same doors, whatever measures them.
     **{
         f"test-{name}": f"--preset varied --scenes 200 --seed 21 --sensor {sensor}"
@@ -44,6 +46,8 @@ JOINED = {
         "no-door-d435",
         "no-door-kinect",
         "no-door-deepdoors2",
+        "varied-clean",
+        "no-door-clean",
     ),
 }
 # The D435 sees 10 m, all others 5 or less. Doors are within 3.5 m, and farthest-point sampling spends its points on
