@@ -146,7 +146,7 @@ def test_shares_that_switch_a_condition_off_are_refused(wrong: dict[str, float])
 
 
 def test_a_door_that_is_not_open_never_becomes_open_by_losing_data(small_dataset: PreparedDataset) -> None:
-    predictor = Predictor.load(points=512)
+    predictor = Predictor.load("ogurob-pointnet2", points=512)
     careless = Predictor(predictor.network, predictor.card, 512, gate=None)
     wrong_without_gate = 0
     shut = [sample for sample in small_dataset.rows if sample["state"] != "open"]

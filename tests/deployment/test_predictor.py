@@ -235,7 +235,7 @@ def test_threads_share_a_predictor(predictor: Predictor, small_dataset: Prepared
     assert together == alone * 4
 
 
-@pytest.mark.parametrize("name", packaged_networks())
+@pytest.mark.parametrize("name", [name for name in packaged_networks() if name.startswith("ogurob-")])
 def test_packaged_weights_answer_new_doors(name: str, small_dataset: PreparedDataset) -> None:
     assert packaged_weights(name).stat().st_size < 8e6
     predictor = Predictor.load(name)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a robot says after each message: simulated doors as clouds and as depth images, by the packaged weights."""
+"""What a robot says after each message: simulated doors as clouds and as depth images, by packaged weights."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Remembering(Predictor):
 
 @pytest.fixture(scope="module")
 def predictor() -> Predictor:
-    return Remembering.load(points=POINTS)
+    return Remembering.load("ogurob-pointnet2", POINTS)  # the door of these frames
 
 
 @pytest.fixture(scope="module")
