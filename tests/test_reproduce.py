@@ -71,6 +71,26 @@ def test_publishing_takes_what_is_small_of_finished_runs(
     ]
 
 
+def test_what_is_published_is_restored_with_the_weights_of_the_package(
+    reproduce: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name, config in (("pointnet2", {"network": "pointnet2"}), ("plane_state", {"rule": "plane_state"})):
+        run = RunFolder(tmp_path / "results" / "trial" / "runs" / name / "fold0")
+        run.claim(config, {})
+        run.finish({})
+    (tmp_path / "results" / "trial" / "report").mkdir()
+    monkeypatch.setattr(reproduce, "RESULTS", tmp_path / "results")
+    monkeypatch.setattr(reproduce, "RUNS", tmp_path / "runs")
+    reproduce.main(["restore", "trial", "ogurob-"])
+    assert [str(path.parent.relative_to(tmp_path)) for path in tmp_path.rglob("*.safetensors")] == [
+        "runs/trial/runs/pointnet2/fold0"
+    ]
+    assert not (tmp_path / "runs" / "trial" / "report").exists()
+    assert RunFolder(tmp_path / "runs" / "trial" / "runs" / "plane_state" / "fold0").finished
+    with pytest.raises(SystemExit, match="is there already"):
+        reproduce.main(["restore", "trial"])
+
+
 def test_folds_that_all_methods_have_finished_are_shown(reproduce: ModuleType, tmp_path: Path) -> None:
     from results_page import unfinished_runs, whole_folds
 

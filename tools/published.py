@@ -9,6 +9,7 @@ from pathlib import Path
 
 from doorstate.dataset.splits import read_splits
 from doorstate.dataset.store import MANIFEST, open_dataset
+from doorstate.deployment.predictor import packaged_weights
 from doorstate.files import write_csv
 from doorstate.training.run_folder import read_json
 
@@ -33,6 +34,28 @@ def publish(source: Path, target: Path) -> None:
     shutil.copytree(source, target, ignore=skipped, dirs_exist_ok=True)
     for path in source.rglob("comparison.json"):
         _publish_rows(path.parent, target.parent)
+
+
+def restore(source: Path, target: Path, prefix: str = "") -> None:
+    """A published comparison as if it had been run here, with the packaged weights of its networks, float16.
+
+    Args:
+        source: in the folder of everything published.
+        target: where a command would have left it; not there yet.
+        prefix: before a network's name in the name of its packaged weights.
+    """
+    if target.exists():
+        sys.exit(f"{target}: is there already")
+    shutil.copytree(source, target, ignore=shutil.ignore_patterns("report"))
+    for folder in sorted(target.glob("runs/*/fold0")):
+        weights = packaged_weights(f"{prefix}{folder.parent.name}") if _is_network(folder) else None
+        if weights is not None:
+            shutil.copyfile(weights, folder / "weights.safetensors")
+            print(f"{folder}: weights of the package, rounded to float16")
+
+
+def _is_network(run: Path) -> bool:
+    return "network" in read_json(run / "config.json")
 
 
 def rows_of(comparison: Path, published: Path) -> Path:

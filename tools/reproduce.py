@@ -4,6 +4,7 @@
 python tools/reproduce.py run paper            # data, all runs, report; goes on where it was stopped
 python tools/reproduce.py publish paper        # runs/paper -> results/paper, without weights
 python tools/reproduce.py build                # tables, figures, reports and docs/results.md from results/
+python tools/reproduce.py restore mixture      # results/mixture -> runs/mixture, with the packaged weights
 python tools/reproduce.py again pointnet2 0    # one run from nothing: is it within the published spread?
 python tools/reproduce.py check                # the same into a scratch folder: are the committed files those?
 """
@@ -19,7 +20,7 @@ from pathlib import Path
 
 from data_sets import commands
 from doorstate_command import REPOSITORY, doorstate
-from published import publish, rows_of
+from published import publish, restore, rows_of
 from studies import read_asked, write_study
 
 from doorstate.dataset.store import open_dataset
@@ -40,6 +41,8 @@ def main(arguments: list[str]) -> None:
     elif command == "publish" and names:
         for name in names:
             publish(RUNS / name, RESULTS / name)
+    elif command == "restore" and len(names) in (1, 2):
+        restore(RESULTS / names[0], RUNS / names[0], *names[1:])
     elif command == "again" and len(names) == 2 and names[1].isdigit():
         sys.exit(again(names[0], int(names[1])))
     elif command == "build" and not names:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from doorstate.dataset.join import join_datasets
-from doorstate.dataset.store import PARTS, PreparedDataset, open_dataset
+from doorstate.dataset.store import CLOUDS, DESCRIPTION, MANIFEST, PARTS, PreparedDataset, open_dataset
 from doorstate.errors import ConfigError, DatasetError
 
 
@@ -56,6 +56,20 @@ def test_parts_are_left_out_where_one_does_not_know_them(
     joined = join_datasets([folder / "varied-160", tmp_path / "blind"], tmp_path / "joined")
     assert not joined.knows_parts
     assert len(joined) == 36
+
+
+def test_a_join_that_was_killed_is_done_again(scene_dataset: PreparedDataset, tmp_path: Path) -> None:
+    parts = [scene_dataset.folder.parent / name for name in ("varied-160", "no-door-160")]
+    folder = tmp_path / "joined"
+    whole = join_datasets(parts, folder)
+    (folder / DESCRIPTION).unlink()
+    (folder / MANIFEST).unlink()
+    (folder / CLOUDS).write_bytes(b"old")
+    assert len(join_datasets(parts, folder)) == len(whole)
+    (folder / DESCRIPTION).rename(tmp_path / DESCRIPTION)
+    (folder / "notes.txt").touch()
+    with pytest.raises(ConfigError, match="holds something; choose another folder"):
+        join_datasets(parts, folder)
 
 
 def test_clouds_that_end_early_say_so_only_if_all_do(scene_dataset: PreparedDataset, tmp_path: Path) -> None:

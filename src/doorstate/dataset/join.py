@@ -25,11 +25,13 @@ from doorstate.files import atomic_path, is_vacant, write_csv
 def join_datasets(sources: Sequence[Path], folder: Path) -> PreparedDataset:
     """Write the samples of prepared data sets behind one another; parts of points if all of them know theirs.
 
+    What a killed join left behind is written anew.
+
     Raises:
         ConfigError: the folder is not empty, or the data sets have clouds of different sizes.
         DatasetError: one cannot be opened, or two hold a sample of the same name.
     """
-    if not is_vacant(folder):
+    if not (is_vacant(folder) or _is_begun(folder)):
         raise ConfigError(f"{folder}: exists and holds something; choose another folder")
     datasets = [open_dataset(source) for source in sources]
     num_points = datasets[0].num_points
@@ -64,6 +66,12 @@ def join_datasets(sources: Sequence[Path], folder: Path) -> PreparedDataset:
         doorstate_version=__version__,
     ).save(folder)
     return open_dataset(folder)
+
+
+def _is_begun(folder: Path) -> bool:
+    """Whether a join was killed here, after its clouds were written and before its description was."""
+    names = {path.name for path in folder.iterdir() if ".tmp." not in path.name} if folder.is_dir() else set()
+    return CLOUDS in names and names <= {CLOUDS, PARTS, MANIFEST}
 
 
 def _stack(target: Path, arrays: Sequence[np.ndarray]) -> None:
