@@ -118,6 +118,24 @@ def test_parts_follow_their_points(name: str) -> None:
     assert found.std(dim=1).min() > 1e-6
 
 
+@pytest.mark.parametrize("name", WITH_PARTS)
+@pytest.mark.parametrize("count", [60, 400])
+def test_parts_of_the_first_points_are_those_of_all(name: str, count: int) -> None:
+    network = headed(name).double().eval()
+    points = clouds(700).double()
+    parts = torch.randint(-1, 6, (3, 700), generator=torch.Generator().manual_seed(5))
+    wanted = {key: value.double() for key, value in targets().items()} | {"parts": parts}
+    with torch.inference_mode():
+        every = answers(network, points)["parts"]
+        encoding = network.encode(points)
+        some = network.heads["parts"](points[:, :count], encoding)
+        losses, _ = joint_losses(network, points, LABELS, wanted, part_points=count)
+    torch.testing.assert_close(some, every[:, :count], atol=1e-9, rtol=0)
+    known = parts[:, :count] >= 0
+    expected = torch.nn.functional.cross_entropy(every[:, :count][known], parts[:, :count][known])
+    torch.testing.assert_close(losses["parts"], expected)
+
+
 def test_unknown_targets_cost_nothing() -> None:
     network = headed("pointnet2").train()
     unknown = {key: torch.full_like(value, math.nan) for key, value in targets().items() if key in HEADS}

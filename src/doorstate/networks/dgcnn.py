@@ -75,10 +75,11 @@ class PartBranch(nn.Module):
         self.head = PointHead(512, 2048, num_parts)
 
     def forward(self, points: Tensor, encoding: Encoding) -> Tensor:
-        """(B, N, num_parts) logits in the order of the points."""
+        """(B, n, num_parts) logits of the first n points, those that are given."""
         order, edges = encoding.inner
-        logits: Tensor = self.head(edges, encoding.features)
-        return gather_rows(logits, order.argsort(dim=1))
+        place = order.argsort(dim=1)[:, : points.shape[1]]
+        logits: Tensor = self.head(gather_rows(edges, place), encoding.features)
+        return logits
 
 
 class DGCNN(PointNetwork):

@@ -185,6 +185,7 @@ def joint_losses(
     targets: Targets,
     label_smoothing: float = 0.0,
     neighbourhoods: Neighbourhoods | None = None,
+    part_points: int | None = None,
 ) -> tuple[dict[str, Tensor], Tensor]:
     """Scalar losses by head, "state" among them, each the mean over the clouds that know its target.
 
@@ -195,6 +196,7 @@ def joint_losses(
         targets: by head; "parts" (B, N) int64, negative where unknown.
         label_smoothing: of the state.
         neighbourhoods: as in `PointNetwork.forward`.
+        part_points: so many of each cloud, the first, which lie all over it, is what parts are learned on; all if None.
 
     Returns:
         Losses, and (B, num_classes) logits of the states.
@@ -207,7 +209,8 @@ def joint_losses(
     for name, head in network.heads.items():
         target = targets[name]
         if not isinstance(head, Head):
-            losses[name] = _part_loss(at_least_float32(head(points, encoding)), target)
+            some = slice(part_points)
+            losses[name] = _part_loss(at_least_float32(head(points[:, some], encoding)), target[:, some])
             continue
         # The hidden layer normalises over the batch: all clouds go through it, known or not.
         outputs = head(encoding.features)

@@ -48,8 +48,8 @@ class PartBranch(nn.Module):
         self.head = PointHead(64, 1024, num_parts)
 
     def forward(self, points: Tensor, encoding: Encoding) -> Tensor:
-        """(B, N, num_parts) logits."""
-        logits: Tensor = self.head(encoding.inner[1], encoding.features)
+        """(B, n, num_parts) logits of the first n points, those that are given."""
+        logits: Tensor = self.head(encoding.inner[1][:, : points.shape[1]], encoding.features)
         return logits
 
 

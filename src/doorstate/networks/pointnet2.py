@@ -100,9 +100,9 @@ class PartBranch(nn.Module):
         self.rest = nn.Sequential(nn.ReLU(), Dense(128, 128), glorot(nn.Linear(128, num_parts)))
 
     def forward(self, points: Tensor, encoding: Encoding) -> Tensor:
-        """(B, N, num_parts) logits."""
-        first, second = encoding.inner
-        near, far = points[:, : first.shape[1]], points[:, : second.shape[1]]
+        """(B, n, num_parts) logits of the first n points, those that are given."""
+        near, first, second = encoding.inner
+        far = near[:, : second.shape[1]]
         cloud = encoding.features.unsqueeze(1).expand(-1, second.shape[1], -1)
         rows = self.first(first) + interpolate(self.second(torch.cat([second, cloud], dim=-1)), far, near)
         rows = self.between(self.first_norm(rows).relu())
@@ -184,10 +184,10 @@ class PointNet2(PointNetwork):
     def encode(self, points: Tensor, neighbourhoods: Neighbourhoods | None = None) -> Encoding:
         """Features (B, 1024) are the maximum over the centres of the second level, whose coordinates enter absolutely.
 
-        Inner: (B, M, C) features of the centres of both levels, which are the first M points.
+        Inner: (B, M, 3) centres of the first level, and (B, M, C) features of the centres of both levels.
         """
         balls = neighbourhoods or self.neighbourhoods(points)
         scales = len(self.level1.balls)
-        centres, first = self.level1(points, None, balls[:scales])
-        centres, second = self.level2(centres, first, balls[scales:])
-        return Encoding(self.level3(centres, second), (first, second))
+        near, first = self.level1(points, None, balls[:scales])
+        far, second = self.level2(near, first, balls[scales:])
+        return Encoding(self.level3(far, second), (near, first, second))

@@ -312,7 +312,12 @@ class _Trainer:
         with self.fabric.autocast():
             if self.config.heads:
                 losses, _ = self.joint_losses(
-                    batch.points, batch.labels, batch.targets, smoothing, batch.neighbourhoods
+                    batch.points,
+                    batch.labels,
+                    batch.targets,
+                    smoothing,
+                    batch.neighbourhoods,
+                    self.config.recipe.part_points,
                 )
                 loss = torch.stack(list(losses.values())).sum()
             else:

@@ -53,14 +53,18 @@ class Recipe(Frozen):
     batchnorm_momentum: tuple[float, float] | None = None  # first and last, halved with every step
     augmentation: Augmentation = Augmentation()
     coarse_to_fine: tuple[Stage, ...] = ()  # what the shares leave is trained on all points and centres
+    part_points: int | None = Field(
+        default=None, ge=1
+    )  # of each cloud that parts are learned on; None is all
     precision: Literal["auto", "fp32", "bf16"] = "auto"
     compile: bool = False  # torch.compile; docs/speed.md has what it brings
 
     @model_serializer(mode="wrap")
     def _without_what_is_not_given(self, fields: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        # Runs that were begun before there was a limit go on.
+        # Runs that were begun before there were limits go on.
+        limits = ("clouds_per_epoch", "part_points")
         return {
-            name: value for name, value in fields(self).items() if (name, value) != ("clouds_per_epoch", None)
+            name: value for name, value in fields(self).items() if name not in limits or value is not None
         }
 
 
