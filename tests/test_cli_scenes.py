@@ -39,6 +39,19 @@ def test_scenes_in_shares_and_as_worlds(run: Run, tmp_path: Path) -> None:
     assert "9 no_door" in out
 
 
+def test_scenes_are_prepared_as_they_are_rendered(run: Run, tmp_path: Path) -> None:
+    folder, clouds = tmp_path / "scenes", tmp_path / "clouds"
+    simulate = ("simulate", "--preset", "varied", "--scenes", 3, "--out", folder, "--workers", 1)
+    prepared = ("--prepared", clouds, "--points", 128, "--thin", "--max-depth-m", 5)
+    code, out, _ = run(*simulate, *prepared)
+    assert code == 0
+    assert "9 clouds of 128 points" in out
+    assert run("prepare", folder, "--out", clouds, *prepared[2:])[0] == 0, "it is there already"
+    code, _, err = run(*simulate, "--thin")
+    assert code == 2
+    assert "are for --prepared FOLDER" in err
+
+
 def test_what_cannot_be_simulated_is_one_line(run: Run, tmp_path: Path) -> None:
     for options, reason in (
         (("--preset", "varies"), "no preset 'varies': choose one of ogurob, "),

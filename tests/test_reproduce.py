@@ -137,18 +137,19 @@ def test_data_sets_are_made_of_what_the_command_line_knows(reproduce: ModuleType
 
     seeds: dict[str, set[str]] = {}
     for name in data_sets.SIMULATED:
-        simulate, prepare = data_sets.commands(tmp_path / f"{name}-4096")
+        (simulate,) = data_sets.commands(tmp_path / f"{name}-4096")
         words = simulate.split()
         seed = words[words.index("--seed") + 1] if "--seed" in words else "0"
         preset = words[words.index("--preset") + 1]
         scenes = words[words.index("--scenes") + 1] if "--scenes" in words else None
         sensor = words[words.index("--sensor") + 1] if "--sensor" in words else "none"
         settings_for(preset, int(seed), None, None if scenes is None else int(scenes), (), sensor)
-        assert prepare.startswith(f"prepare {words[-1]} ")
+        assert words[words.index("--prepared") + 1] == f"{words[words.index('--out') + 1]}-4096"
         seeds.setdefault(seed, set()).add("test" if name.startswith("test-") else "train")
     assert all(len(uses) == 1 for uses in seeds.values()), "no scene is trained and tested on"
     *parts, join = data_sets.commands(tmp_path / "mixture-4096")
-    assert [line.split()[-1] for line in parts[1::2]] == join.split()[1:-2]
+    made = [line.split()[line.split().index("--prepared") + 1] for line in parts]
+    assert made == join.split()[1:-2]
     (tmp_path / "mixture-4096").mkdir()
     (tmp_path / "mixture-4096" / "dataset.json").touch()
     assert list(data_sets.commands(tmp_path / "mixture-4096")) == []

@@ -64,8 +64,7 @@ def commands(prepared: Path) -> Iterator[str]:
     name = prepared.name.removesuffix("-4096")
     if name not in JOINED:
         options = "" if name == "ogurob" else f" {BEYOND}"
-        yield f"simulate {SIMULATED[name]} --out data/{name}"
-        yield f"prepare data/{name}{options} --out data/{name}-4096"
+        yield f"simulate {SIMULATED[name]} --out data/{name} --prepared data/{name}-4096{options}"
     elif not (prepared / "dataset.json").is_file():
         parts = [prepared.with_name(f"{part}-4096") for part in JOINED[name]]
         for part in parts:

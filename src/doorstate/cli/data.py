@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -21,8 +21,24 @@ from doorstate.cli.options import (
 )
 from doorstate.errors import ConfigError
 
+if TYPE_CHECKING:
+    from doorstate.dataset.prepare import PreparationSummary
+
 ShardOption = Annotated[
     str | None, typer.Option(help="Do only this share, such as 2/8; without it all shares are joined.")
+]
+
+
+PreparedPoints = Annotated[int, typer.Option(help="Points kept of every cloud.", min=128)]
+MaxDepth = Annotated[
+    float | None,
+    typer.Option("--max-depth-m", help="Leave out points farther ahead, in metres.", min=0.5),
+]
+Thin = Annotated[
+    bool,
+    typer.Option(
+        "--thin", help="Sample from every second, third ... row and column of images, as predict does."
+    ),
 ]
 
 
@@ -51,6 +67,13 @@ def simulate(
     ] = None,
     workers: Workers = None,
     shard: ShardOption = None,
+    prepared: Annotated[
+        Path | None,
+        typer.Option(help="Prepare the clouds into this folder as well, as 'doorstate prepare' does."),
+    ] = None,
+    points: PreparedPoints = 4096,
+    max_depth: MaxDepth = None,
+    thin: Thin = False,
 ) -> None:
     """Simulate doors seen by a depth camera: a manifest whose every row rebuilds its cloud.
 
@@ -61,9 +84,12 @@ def simulate(
       doorstate simulate --preset varied --scenes 10000 --out data/varied
       doorstate simulate --preset varied --scenes 10000 --sensor xtion --out data/varied-xtion
       doorstate simulate --preset cluttered --scenes 40000 --shard 2/8 --out data/cluttered
+      doorstate simulate --preset varied --sensor d435 --out data/d435 --prepared data/d435-4096 --thin --max-depth-m 5
     """
     from doorstate.console import err, print_table, progress_bar
     from doorstate.console import out as stdout
+    from doorstate.dataset.prepare import Preparation
+    from doorstate.dataset.simulated import Sampler, simulate_prepared
     from doorstate.dataset.strata import BANDS, REGIONS, distance_band, region
     from doorstate.jobs import Shard
     from doorstate.simulation.generate import PRESETS
@@ -75,13 +101,18 @@ def simulate(
         raise ConfigError(f"--keep {unknown[0]}: choose from {', '.join(RAW_KINDS)}")
     kinds: Any = tuple(kind for kind in RAW_KINDS if kind in (keep or []))
     settings = settings_for(preset, seed, poses, scenes, kinds, sensor)
+    asked = Preparation(out, points, max_depth_m=max_depth, thin=thin)
+    if prepared is None and asked != Preparation(out):
+        raise ConfigError("--points, --max-depth-m and --thin are for --prepared FOLDER: give it too")
     if shard is not None:
         share = Shard.parse(shard)
         with progress_bar("Simulating") as progress:
-            simulate_shard(out, settings, share, workers, progress)
+            simulate_shard(out, settings, share, workers, progress, Sampler(asked) if prepared else None)
         stdout.print(f"share {shard} is in {out}; when all are, the same command without --shard joins them")
         return
     with progress_bar("Simulating") as progress:
+        if prepared is not None:
+            summary = simulate_prepared(settings, asked, prepared, workers, progress)
         rows = simulate_dataset(out, settings, workers, progress)
     counts = [
         (distance_band(float(row["distance_m"])), region(float(row["robot_angle_deg"]))) for row in rows
@@ -104,13 +135,17 @@ def simulate(
         err.print(
             f"{twins} frames look the same in another state: nobody can tell them apart (same_image_as)"
         )
+    if prepared is not None:
+        stdout.print(f"{len(rows)} samples in {out}")
+        _tell(summary, prepared, points)
+        return
     stdout.print(f"{len(rows)} samples in {out}; next: doorstate prepare {out} --out {out}-4096")
 
 
 def prepare(
     source: Annotated[Path, typer.Argument(help="A simulated folder, or class folders of clouds.")],
     out: Annotated[Path, typer.Option(help="Folder to make, or to go on with.")],
-    points: Annotated[int, typer.Option(help="Points kept of every cloud.", min=128)] = 4096,
+    points: PreparedPoints = 4096,
     poses: Annotated[
         Path | None,
         typer.Option(help="CSV of poses for class folders: file,x_m,y_m or file,distance_m,robot_angle_deg."),
@@ -127,16 +162,8 @@ def prepare(
     workers: Workers = None,
     shard: ShardOption = None,
     layout: LayoutName = None,
-    max_depth: Annotated[
-        float | None,
-        typer.Option("--max-depth-m", help="Leave out points farther ahead, in metres.", min=0.5),
-    ] = None,
-    thin: Annotated[
-        bool,
-        typer.Option(
-            "--thin", help="Sample from every second, third ... row and column of images, as predict does."
-        ),
-    ] = False,
+    max_depth: MaxDepth = None,
+    thin: Thin = False,
 ) -> None:
     """Clean clouds and bring them into farthest-point order, ready for training.
 
@@ -148,11 +175,10 @@ def prepare(
       doorstate prepare DeepDoors2 --layout deepdoors2 --out data/deepdoors2
       doorstate prepare ~/OGUROB_DOORS --poses poses.csv --frame optical --out data/original
     """
-    from doorstate.console import err, progress_bar
     from doorstate.console import out as stdout
+    from doorstate.console import progress_bar
     from doorstate.dataset.prepare import Preparation, prepare_dataset, prepare_shard
     from doorstate.jobs import Shard
-    from doorstate.types import NO_DOOR, STATES
 
     options = read_options(frame, roll, units, depth_scale, intrinsics, (fx, fy, cx, cy), layout)
     if layout is not None and poses is not None:
@@ -166,6 +192,15 @@ def prepare(
         return
     with progress_bar("Preparing") as progress:
         summary = prepare_dataset(asked, out, workers, progress)
+    _tell(summary, out, points)
+
+
+def _tell(summary: PreparationSummary, out: Path, points: int) -> None:
+    """Say what was prepared; exit code 1 if something was left out."""
+    from doorstate.console import err
+    from doorstate.console import out as stdout
+    from doorstate.types import NO_DOOR, STATES
+
     for row in summary.rejected[:10]:
         err.print(f"left out {row['file'] or row['sample_id']}: {row['reason']}")
     if summary.rejected:

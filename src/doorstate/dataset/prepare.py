@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from doorstate import __version__
 from doorstate.clouds.io import ReadOptions, read_cloud
@@ -127,7 +128,17 @@ def prepare_dataset(
         rejected = read_csv(folder / REJECTED) if (folder / REJECTED).exists() else []
         return PreparationSummary(open_dataset(folder), rejected)
     run_pieces(_prepare_piece, pieces, paths, workers or default_workers(), progress)
-    rows = [row for piece in pieces for row in piece.rows]
+    return finish([row for piece in pieces for row in piece.rows], asked, folder, paths)
+
+
+def finish(
+    rows: list[dict[str, str]], asked: Preparation, folder: Path, paths: Sequence[Path]
+) -> PreparationSummary:
+    """Make a claimed folder the data set of rows whose clouds lie in `paths`, files of `write_clouds`.
+
+    Raises:
+        DatasetError: nothing could be prepared.
+    """
     reasons = _reasons(paths)
     if all(reasons):
         _release(folder)
@@ -143,7 +154,7 @@ def prepare_dataset(
         samples=len(rows) - len(rejected),
         doorstate_version=__version__,
     ).save(folder)
-    shutil.rmtree(folder / _SCRATCH)
+    shutil.rmtree(folder / _SCRATCH, ignore_errors=True)
     return PreparationSummary(open_dataset(folder), rejected)
 
 
@@ -170,7 +181,7 @@ def prepare_shard(
 def _plan(asked: Preparation, folder: Path) -> tuple[list[_Piece], list[Path]]:
     """Claim the folder, and say what is to be done and where it goes."""
     rows = asked.rows()
-    _claim(folder, asked.to_json(rows))
+    claim(folder, asked.to_json(rows))
     pieces = [
         _Piece(asked, rows[start : start + _SAMPLES_PER_PIECE])
         for start in range(0, len(rows), _SAMPLES_PER_PIECE)
@@ -193,7 +204,12 @@ def _simulated_rows(source: Path) -> list[dict[str, str]]:
     return rows
 
 
-def _claim(folder: Path, text: str) -> None:
+def claim(folder: Path, text: str) -> None:
+    """Mark a folder with what is prepared in it.
+
+    Raises:
+        ConfigError: it holds something else.
+    """
     path = folder / _CLAIM
     if is_vacant(folder):
         write_text(path, text)
@@ -209,7 +225,7 @@ def _prepare_piece(piece: _Piece, path: Path) -> None:
     read = read_cloud if asked.layout is None else find_layout(asked.layout).read
     simulated = asked.simulated
     clouds: list[Points] = []
-    parts: list[np.ndarray] = []
+    parts: list[NDArray[np.uint8]] = []
     reasons: list[str] = []
     for row in piece.rows:
         try:
@@ -223,16 +239,27 @@ def _prepare_piece(piece: _Piece, path: Path) -> None:
             reasons.append("")
         except (CloudError, CameraError) as error:
             reasons.append(str(error))
+    write_clouds(path, asked.num_points, clouds, parts, reasons)
+
+
+def write_clouds(
+    path: Path,
+    num_points: int,
+    clouds: Sequence[Points],
+    parts: Sequence[NDArray[np.uint8]],
+    reasons: Sequence[str],
+) -> None:
+    """Write the clouds of some samples, their parts where known, and for each why it was left out, or nothing."""
     with atomic_path(path) as temporary:
         np.savez(
             temporary,
-            clouds=np.array(clouds, dtype=np.float32).reshape(-1, asked.num_points, 3),
-            parts=np.array(parts, dtype=np.uint8).reshape(-1, asked.num_points),
+            clouds=np.array(clouds, dtype=np.float32).reshape(-1, num_points, 3),
+            parts=np.array(parts, dtype=np.uint8).reshape(-1, num_points),
             reasons=np.array(reasons, dtype=str),
         )
 
 
-def _from_simulation(row: dict[str, str], asked: Preparation) -> tuple[Points, np.ndarray]:
+def _from_simulation(row: dict[str, str], asked: Preparation) -> tuple[Points, NDArray[np.uint8]]:
     sample = unflatten(row)
     frame = replay(sample)
     if depth_sha256(frame) != sample.depth_sha256:
@@ -244,13 +271,13 @@ def _from_simulation(row: dict[str, str], asked: Preparation) -> tuple[Points, n
 
 def _release(folder: Path) -> None:
     """Leave nothing of a preparation that made nothing: with better options the same folder is asked for again."""
-    shutil.rmtree(folder / _SCRATCH)
+    shutil.rmtree(folder / _SCRATCH, ignore_errors=True)
     (folder / _CLAIM).unlink()
     if is_vacant(folder):
         shutil.rmtree(folder)
 
 
-def _reasons(paths: list[Path]) -> list[str]:
+def _reasons(paths: Sequence[Path]) -> list[str]:
     """Why each cloud was left out, or nothing."""
     reasons: list[str] = []
     for path in paths:
@@ -260,7 +287,7 @@ def _reasons(paths: list[Path]) -> list[str]:
 
 
 def _assemble(
-    folder: Path, asked: Preparation, rows: list[dict[str, str]], paths: list[Path], reasons: list[str]
+    folder: Path, asked: Preparation, rows: list[dict[str, str]], paths: Sequence[Path], reasons: list[str]
 ) -> list[dict[str, str]]:
     kept = [row for row, reason in zip(rows, reasons, strict=True) if not reason]
     rejected = [
@@ -277,7 +304,7 @@ def _assemble(
     return rejected
 
 
-def _concatenate(target: Path, paths: list[Path], name: str, shape: tuple[int, ...], dtype: type) -> None:
+def _concatenate(target: Path, paths: Sequence[Path], name: str, shape: tuple[int, ...], dtype: type) -> None:
     with atomic_path(target) as temporary:
         whole = np.lib.format.open_memmap(temporary, mode="w+", dtype=dtype, shape=shape)
         start = 0

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -32,10 +32,15 @@ _PER_PIECE = 8
 _ANY_SETTINGS: TypeAdapter[Settings] = TypeAdapter(Settings)
 
 
+Also = Callable[[str, Sequence[Row], Sequence[Frame]], None]
+"""What else is done with the rows and frames of a piece, by its name; it must be what another process can be sent."""
+
+
 class _Piece(NamedTuple):
     settings: Settings
     indices: list[int]
     folder: Path
+    also: Also | None
 
 
 def simulate_dataset(
@@ -43,8 +48,16 @@ def simulate_dataset(
     settings: Settings,
     workers: int | None = None,
     progress: Progress = no_progress,
+    also: Also | None = None,
 ) -> list[dict[str, str]]:
     """Simulate into `folder`, going on where a killed run or shards of it stopped.
+
+    Args:
+        folder: where to.
+        settings: what is simulated.
+        workers: processes; None is one per processor.
+        progress: called with pieces done and pieces in all.
+        also: called for every piece before it counts as done, in the process that has rendered it.
 
     Returns:
         The manifest's rows.
@@ -52,7 +65,7 @@ def simulate_dataset(
     Raises:
         ConfigError: the folder holds something else.
     """
-    pieces, paths = _claim(folder, settings)
+    pieces, paths = _claim(folder, settings, also)
     manifest, scratch = folder / MANIFEST, folder / "pieces"
     if manifest.exists():
         shutil.rmtree(scratch, ignore_errors=True)
@@ -71,6 +84,7 @@ def simulate_shard(
     shard: Shard,
     workers: int | None = None,
     progress: Progress = no_progress,
+    also: Also | None = None,
 ) -> None:
     """Simulate the pieces of one shard into `folder`; `simulate_dataset` joins them when all shards are done.
 
@@ -79,7 +93,7 @@ def simulate_shard(
     Raises:
         ConfigError: the folder holds something else.
     """
-    pieces, paths = _claim(folder, settings)
+    pieces, paths = _claim(folder, settings, also)
     if (folder / MANIFEST).exists():
         progress(1, 1)
         return
@@ -101,14 +115,19 @@ def read_settings(folder: Path) -> Settings:
         raise DatasetError(f"{path}: {first_problem(error)}") from error
 
 
+def piece_names(settings: Settings) -> list[str]:
+    """What `also` hears the pieces called, in order."""
+    return [path.stem for path in _pieces(Path(), settings, None)[1]]
+
+
 def is_simulated(folder: Path) -> bool:
     """Whether `folder` was written by `simulate_dataset`."""
     return (folder / _SETTINGS).is_file()
 
 
-def _claim(folder: Path, settings: Settings) -> tuple[list[_Piece], list[Path]]:
+def _claim(folder: Path, settings: Settings, also: Also | None) -> tuple[list[_Piece], list[Path]]:
     """Say what is to be done and where it goes, in a folder that is marked with it; not before that is known."""
-    pieces = _pieces(folder, settings)
+    pieces = _pieces(folder, settings, also)
     if is_vacant(folder):
         write_text(folder / _SETTINGS, json.dumps(settings.model_dump(), indent=2) + "\n")
     elif not is_simulated(folder):
@@ -119,10 +138,10 @@ def _claim(folder: Path, settings: Settings) -> tuple[list[_Piece], list[Path]]:
     return pieces
 
 
-def _pieces(folder: Path, settings: Settings) -> tuple[list[_Piece], list[Path]]:
+def _pieces(folder: Path, settings: Settings, also: Also | None) -> tuple[list[_Piece], list[Path]]:
     indices = settings.indices()
     pieces = [
-        _Piece(settings, indices[start : start + _PER_PIECE], folder)
+        _Piece(settings, indices[start : start + _PER_PIECE], folder, also)
         for start in range(0, len(indices), _PER_PIECE)
     ]
     return pieces, piece_paths(folder / "pieces", len(pieces), ".csv")
@@ -130,11 +149,15 @@ def _pieces(folder: Path, settings: Settings) -> tuple[list[_Piece], list[Path]]
 
 def _simulate_piece(piece: _Piece, path: Path) -> None:
     rows: list[Row] = []
+    kept: list[Frame] = []
     for index in piece.indices:
         new, frames = piece.settings.simulate(index)
         for row, frame in zip(new, frames, strict=True):
             _write_raw(piece.folder, row, frame, piece.settings.raw)
         rows += new
+        kept += frames if piece.also else []
+    if piece.also:
+        piece.also(path.stem, rows, kept)
     write_csv(path, [flatten(row) for row in rows])
 
 
