@@ -20,7 +20,8 @@ from doorstate.errors import DoorstateError
 
 def main(recording: Path, table: Path) -> None:
     """Write the changes."""
-    predictor = Predictor.load(points=512)
+    # It knows the door of make_bag.py; for doors of the world leave the name out.
+    predictor = Predictor.load("ogurob-pointnet2", points=512)
     before = None
     with open_bag(recording) as bag, table.open("w", newline="", encoding="utf-8") as stream:
         rows = csv.writer(stream)

@@ -51,8 +51,9 @@ def test_the_package_stays_small() -> None:
     sets: Counter[str] = Counter()
     for name in packaged_networks():
         sets[name.rpartition("-")[0]] += packaged_weights(name).stat().st_size
-    assert sets
-    assert max(sets.values()) <= 25e6, "of one set of networks"
+    assert sets.pop("ogurob") <= 25e6
+    assert sets.pop("") <= 30e6, "with heads"
+    assert not sets
 
 
 def test_weights_are_packaged_with_a_temperature_and_a_card(
@@ -131,7 +132,7 @@ def test_weights_that_were_tested_say_how_well_and_when_they_are_unsure(
     scaled = at_temperature(validation.validation.probabilities, card.temperature)
     wrong = scaled.argmax(axis=1) != validation.validation.true
     answered = scaled.max(axis=1) >= card.abstain_below
-    assert wrong[answered].sum() <= 0.01 * answered.sum()
+    assert wrong[answered].sum() <= tool._WRONG_SHARE * answered.sum()
     assert not wrong.any() or card.abstain_below > 0
     text = (package / "some-pointnet.md").read_text(encoding="utf-8")
     assert "--network some-pointnet" in text
