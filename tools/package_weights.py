@@ -51,7 +51,9 @@ _FEWEST, _LOST = (
     1024,
     0.002,
 )  # default points are no fewer, and lose no more macro-F1 on samples never learned from
-_WRONG_SHARE = 0.05  # of the validation samples that are answered at all; with less, few would be (docs/log.md)
+_WRONG_SHARE = (
+    0.05  # of the validation samples that are answered at all; with less, few would be (docs/log.md)
+)
 
 
 class Evidence(NamedTuple):

@@ -21,6 +21,7 @@ from doorstate.evaluation.results import ComparisonResults, load_results
 from doorstate.evaluation.stratum_tables import is_undecidable
 from doorstate.evaluation.stratum_tables import rows_of as manifest_of
 from doorstate.evaluation.table import Table, number
+from doorstate.networks import list_networks
 
 FEW_MEASURED = 150_000  # of the 307,200 pixels of an image
 # Where there is little to fit a plane to, or the planes are not those of leaf and wall.
@@ -156,6 +157,9 @@ def write_worlds_page(results_folder: Path, reports_folder: Path, page: Path) ->
         trained=max(int(run.metric("train_samples")) for run in results.runs if run.network in networks),
         cases=cases.to_markdown().strip() if rules else "",
         rules=rules,
+        untrained=[
+            title for name, title in NAMES.items() if name in list_networks() and name not in networks
+        ],
         lost=_lost(cases, rules),
     )
 
