@@ -70,7 +70,7 @@ def _read(app: Sphinx, page: str, source: list[str]) -> None:
     elif page == "commands":
         text += "\n".join(_help_of_commands())
     elif page == "zoo":
-        text = re.sub(r"\]\(\.\./src/[\w/]+/(\w+)\.md\)", r"](#card-\1)", text) + _model_cards()
+        text = re.sub(r"\]\(\.\./src/[\w/]+/([\w-]+)\.md\)", r"](#card-\1)", text) + _model_cards()
     elif page.startswith("benchmarks/"):
         # Tables as `python -m benchmarks` writes them: without headings, reached from the text about them.
         text = "---\norphan: true\n---\n" + re.sub(r"^\*\*(.+)\*\*$", r"# \1", text, flags=re.MULTILINE)
