@@ -51,7 +51,7 @@ JOINED = {
     ),
 }
 # The D435 sees 10 m, all others 5 or less. Doors are within 3.5 m, and farthest-point sampling spends its points on
-# space, which behind an open door is mostly the end of the next room. Thinned as a predictor thins: in half the time.
+# space, which behind an open door is mostly the end of the next room. Thinned as a predictor thins.
 BEYOND = "--thin --max-depth-m 5"
 
 
