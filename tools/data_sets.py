@@ -32,8 +32,9 @@ SIMULATED = {
             *((f"{mm}mm", f"gaussian:{mm / 1000:g}") for mm in (5, 10, 20, 40)),
         )
     },
+    "test-ogurob": "--preset ogurob --poses 200 --seed 31",
     "test-angles": "--preset varied-angles --scenes 200 --seed 22 --sensor xtion",
-    "test-cluttered": "--preset cluttered --scenes 600 --seed 23 --sensor xtion",
+    "test-cluttered": "--preset cluttered --scenes 400 --seed 23 --sensor xtion",
 }
 JOINED = {
     # Every camera sees doors and walls without one: what a camera looks like must not tell them apart.
@@ -63,7 +64,7 @@ def commands(prepared: Path) -> Iterator[str]:
     """
     name = prepared.name.removesuffix("-4096")
     if name not in JOINED:
-        options = "" if name == "ogurob" else f" {BEYOND}"
+        options = "" if name.endswith("ogurob") else f" {BEYOND}"
         yield f"simulate {SIMULATED[name]} --out data/{name} --prepared data/{name}-4096{options}"
     elif not (prepared / "dataset.json").is_file():
         parts = [prepared.with_name(f"{part}-4096") for part in JOINED[name]]

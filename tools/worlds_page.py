@@ -15,6 +15,7 @@ from results_page import NAMES, render, whole_folds
 
 from doorstate.dataset.store import PreparedDataset, open_dataset
 from doorstate.evaluation.calibration import calibrate, reliability
+from doorstate.evaluation.factors import ANGLE, OCCLUSION, factor_bins
 from doorstate.evaluation.head_tables import answer_errors
 from doorstate.evaluation.metrics import confusion_matrix, scores
 from doorstate.evaluation.results import ComparisonResults, load_results
@@ -37,7 +38,9 @@ CASES: dict[str, Callable[[Mapping[str, str]], bool]] = {
     f"fewer than {FEW_MEASURED} measured pixels": lambda row: float(row["measured_px"]) < FEW_MEASURED,
     f"from nearer than {NEARBY_M:.0f} m": lambda row: float(row["distance_m"]) < NEARBY_M,
 }
+MIXTURE = "mixture-1024"  # the comparison of the page
 STUDIES = ("mixture-points", "transfer", "augmentation")  # shown below, once they are published
+ANGLES, CLUTTER = (f"transfer/mixture/{name}" for name in ("angles", "cluttered"))
 
 
 class Target(NamedTuple):
@@ -48,7 +51,7 @@ class Target(NamedTuple):
     more_is_better: bool
     digits: int
     found: Callable[[ComparisonResults, PreparedDataset, str], float]
-    where: str = "mixture"  # published comparison that tells
+    where: str = MIXTURE  # published comparison that tells
 
     def reached(self, value: float) -> bool:
         """Whether a figure is good enough; one that nobody knows is not."""
@@ -120,7 +123,7 @@ TARGETS = (
         False,
         1,
         _points_lost,
-        "transfer/mixture/cluttered",
+        CLUTTER,
     ),
 )
 
@@ -133,7 +136,7 @@ def write_worlds_page(results_folder: Path, reports_folder: Path, page: Path) ->
         reports_folder: holds `<experiment>/report` of each, made before.
         page: where to.
     """
-    mixture = results_folder / "mixture"
+    mixture = results_folder / MIXTURE
     if not mixture.is_dir() or not whole_folds(mixture):
         return
     results = load_results(mixture, rows_of(mixture, results_folder))
@@ -142,7 +145,7 @@ def write_worlds_page(results_folder: Path, reports_folder: Path, page: Path) ->
             path.stem: path.read_text(encoding="utf-8").strip()
             for path in (reports_folder / name / "report" / "tables").glob("*.md")
         }
-        for name in ("mixture", *STUDIES)
+        for name in (MIXTURE, *STUDIES)
     }
     rules = results.comparison.rules
     networks = tuple(method for method in results.networks if method not in rules)
@@ -153,7 +156,10 @@ def write_worlds_page(results_folder: Path, reports_folder: Path, page: Path) ->
         page,
         results=results,
         targets=targets_table(results_folder, networks).to_markdown().strip(),
+        mixture=MIXTURE,
         tables=tables,
+        by_angle=_by_factor(results_folder, ANGLES, ANGLE),
+        by_occlusion=_by_factor(results_folder, CLUTTER, OCCLUSION),
         trained=max(int(run.metric("train_samples")) for run in results.runs if run.network in networks),
         cases=cases.to_markdown().strip() if rules else "",
         rules=rules,
@@ -162,6 +168,28 @@ def write_worlds_page(results_folder: Path, reports_folder: Path, page: Path) ->
         ],
         lost=_lost(cases, rules),
     )
+
+
+def _by_factor(results_folder: Path, where: str, factor: str) -> str:
+    """Accuracy of every method by a factor, of test clouds made for it, as Markdown; "" until that is published."""
+    comparison = results_folder / where
+    if not comparison.is_dir():
+        return ""
+    folder = rows_of(comparison, results_folder)
+    results, dataset = load_results(comparison, folder), open_dataset(folder)
+    bins = [each for each in factor_bins(results, dataset) if each.factor == factor]
+    accuracy = {(each.method, each.low): number(each.right / each.samples) for each in bins}
+    first = [each for each in bins if each.method == results.networks[0]]
+    rows = tuple(
+        (
+            f"{each.low:g} to {each.high:g}",
+            str(each.samples),
+            *(accuracy[method, each.low] for method in results.networks),
+        )
+        for each in first
+    )
+    columns = (factor, "samples", *(NAMES.get(method, method) for method in results.networks))
+    return Table(f"Accuracy by {factor}", columns, rows).to_markdown().strip()
 
 
 def _lost(cases: Table, rules: Sequence[str]) -> list[str]:

@@ -128,6 +128,27 @@ def test_runs_go_on_from_the_weights_of_another_comparison(
     assert one[name] == other[name]
 
 
+def test_networks_that_the_other_comparison_lacks_begin_anew(
+    small_dataset: PreparedDataset, tmp_path: Path
+) -> None:
+    first = experiment(small_dataset, folds=1, recipe_changes=CHANGES | {"epochs": 1})
+    compare(first, tmp_path / "first")
+    both = {"networks": ("pointnet", "pointnet2"), "start_from": str(tmp_path / "first")}
+    compare(first.model_copy(update=both), tmp_path / "again")
+    began = {
+        network: json.loads((tmp_path / f"again/runs/{network}/fold0/config.json").read_text())["start_from"]
+        for network in both["networks"]
+    }
+    assert began == {
+        "pointnet": None,
+        "pointnet2": str(tmp_path / "first/runs/pointnet2/fold0/weights.safetensors"),
+    }
+    with pytest.raises(RunError, match="no such comparison; run it first"):
+        compare(first.model_copy(update={"start_from": str(tmp_path / "gone")}), tmp_path / "after")
+    with pytest.raises(RunError, match="has none of pointnet to go on from"):
+        prepare_comparison(first.model_copy(update=both | {"networks": ("pointnet",)}), tmp_path / "other")
+
+
 def test_weights_that_have_learned_what_is_tested_are_not_gone_on_from(
     small_dataset: PreparedDataset, tmp_path: Path
 ) -> None:

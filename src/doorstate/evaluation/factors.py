@@ -52,11 +52,12 @@ def _heading_off_deg(row: Mapping[str, str]) -> float:
     return math.remainder(float(row["heading_deg"]) - bearing, 360)
 
 
+ANGLE, OCCLUSION = "opening angle, degrees", "occluded share of the door"
 FACTORS = (
     Factor(
-        "opening angle, degrees",
+        ANGLE,
         _column("opening_angle_deg"),
-        (0, 3, 15, *range(25, 66, 10), *range(75, 116, 10)),
+        (0, 3, 9, 15, *range(25, 66, 10), 70, *range(75, 116, 10)),
     ),
     Factor("distance to the door, m", _column("distance_m"), tuple(np.arange(1.5, 3.51, 0.25).tolist())),
     Factor(
@@ -66,7 +67,7 @@ FACTORS = (
     Factor("camera height, m", _column("camera_height_m"), (0.25, 0.4, 0.6, 0.8, 1.0, 1.2)),
     Factor("camera pitch, degrees", _column("pitch_deg"), (-10, -6, -2, 2, 6, 10)),
     Factor("pixels of the leaf", _column("visible_leaf_px"), (0, 5e3, 1e4, 2e4, 3e4, 4e4, 6e4, 1e5, 2e5)),
-    Factor("occluded share of the door", _column("occluded_share"), (0, 0.001, 0.25, 0.5, 0.75)),
+    Factor(OCCLUSION, _column("occluded_share"), (0, 0.001, 0.25, 0.5, 0.75)),
 )
 
 

@@ -31,7 +31,7 @@ from doorstate.rules import create_rule
 from doorstate.training.fit import RunConfig, fit, threads
 from doorstate.training.recipes import Recipe, find_recipe
 from doorstate.training.rule_run import RuleRunConfig, answer
-from doorstate.training.run_folder import RunFolder, check_same, run_of, write_json
+from doorstate.training.run_folder import RunFolder, check_same, read_json, run_of, write_json
 from doorstate.types import PARTS
 
 M = TypeVar("M", bound=Frozen)
@@ -53,7 +53,7 @@ class Experiment(Frozen):
     network_changes: dict[str, dict[str, Any]] = Field(
         default_factory=dict
     )  # for one network, over recipe_changes
-    # A comparison whose weights of the same network and fold the runs go on from.
+    # A comparison whose weights of the same network and fold the runs go on from; networks it has not begin anew.
     start_from: str | None = None
     heads: tuple[str, ...] = ()  # answers besides the state, trained jointly
 
@@ -208,8 +208,19 @@ def prepare_comparison(experiment: Experiment, folder: Path) -> None:
     if not splits_path.is_file():
         write_splits(splits_path, draw_splits(dataset.rows, experiment.protocol, experiment.seed))
     if experiment.start_from is not None:
-        _check_unseen(read_splits(splits_path), Path(experiment.start_from))
+        before = Path(experiment.start_from)
+        if not set(experiment.networks) & set(read_comparison(before)["networks"]):
+            raise RunError(f"{before}: has none of {', '.join(experiment.networks)} to go on from")
+        _check_unseen(read_splits(splits_path), before)
     write_json(path, settings)
+
+
+def read_comparison(folder: Path) -> dict[str, Any]:
+    """What a comparison was asked to run; RunError if there is none."""
+    path = folder / "comparison.json"
+    if not path.is_file():
+        raise RunError(f"{path}: no such comparison; run it first")
+    return read_json(path)
 
 
 def _check_unseen(splits: Sequence[Mapping[str, Role]], start_from: Path) -> None:
@@ -259,12 +270,20 @@ def train_one(
         num_points=experiment.num_points,
         seed=experiment.seed,
         recipe=experiment.recipe_of(network),
-        start_from=None
-        if experiment.start_from is None
-        else str(run_of(Path(experiment.start_from), network, fold).weights),
+        start_from=_weights_before(experiment, network, fold),
         heads=experiment.heads_of(network),
     )
     return fit(config, dataset, splits[fold], folder)
+
+
+def _weights_before(experiment: Experiment, network: str, fold: int) -> str | None:
+    """The weights file that a run goes on from, if any; RunError without the comparison it should be of."""
+    if experiment.start_from is None:
+        return None
+    before = Path(experiment.start_from)
+    if network not in read_comparison(before)["networks"]:
+        return None
+    return str(run_of(before, network, fold).weights)
 
 
 def answer_one(

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from pydantic import Field
 
@@ -15,8 +15,7 @@ from doorstate.dataset.store import open_dataset
 from doorstate.errors import ConfigError, RunError
 from doorstate.models import Frozen
 from doorstate.networks import list_networks
-from doorstate.training.comparison import Experiment, read_study
-from doorstate.training.run_folder import read_json
+from doorstate.training.comparison import Experiment, read_comparison, read_study
 
 _Name = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9-]*$")]
 
@@ -51,7 +50,7 @@ class TransferStudy(Frozen):
             RunError: a comparison is not there.
         """
         for trained, comparison in self.trained.items():
-            asked = _comparison(comparison)
+            asked = read_comparison(Path(comparison))
             networks = tuple(network for network in self.networks if network in asked["networks"])
             if not networks:
                 raise ConfigError(f"{comparison}: has no {' or '.join(self.networks)}")
@@ -105,17 +104,10 @@ def load_transfer(path: Path) -> TransferStudy:
 def _seen(comparison: str) -> set[str]:
     """Origins of the samples that fold 0 of a comparison was trained or validated on."""
     roles = read_splits(Path(comparison) / "splits.csv")[0]
-    rows = open_dataset(Path(_comparison(comparison)["dataset"])).rows
+    rows = open_dataset(Path(read_comparison(Path(comparison))["dataset"])).rows
     return {_origin(row) for row in rows if roles[row["sample_id"]] in ("train", "val")}
 
 
 def _origin(row: Mapping[str, str]) -> str:
     """What two samples may not share: the scene, whatever sensor saw it; without scenes seed and name."""
     return row.get("scene_id") or f"{row.get('seed', '')}/{row['sample_id']}"
-
-
-def _comparison(folder: str) -> dict[str, Any]:
-    path = Path(folder) / "comparison.json"
-    if not path.is_file():
-        raise RunError(f"{path}: no such comparison; run it first")
-    return read_json(path)
