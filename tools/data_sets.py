@@ -26,7 +26,7 @@ SIMULATED = {
     "no-door-clean": "--preset no-door --scenes 200 --seed 20",
     # To test on: the same doors, whatever measures them.
     **{
-        f"test-{name}": f"--preset varied --scenes 200 --seed 21 --sensor {sensor}"
+        f"test-{name}": f"--preset varied --scenes 100 --seed 21 --sensor {sensor}"
         for name, sensor in (
             *((sensor, sensor) for sensor in ("none", "xtion", "kinect", "d435", "deepdoors2")),
             *((f"{mm}mm", f"gaussian:{mm / 1000:g}") for mm in (5, 10, 20, 40)),
@@ -34,7 +34,7 @@ SIMULATED = {
     },
     "test-ogurob": "--preset ogurob --poses 200 --seed 31",
     "test-angles": "--preset varied-angles --scenes 200 --seed 22 --sensor xtion",
-    "test-cluttered": "--preset cluttered --scenes 400 --seed 23 --sensor xtion",
+    "test-cluttered": "--preset cluttered --scenes 300 --seed 23 --sensor xtion",
 }
 JOINED = {
     # Every camera sees doors and walls without one: what a camera looks like must not tell them apart.
