@@ -145,5 +145,13 @@ def test_weights_that_were_tested_say_how_well_and_when_they_are_unsure(
     ):
         assert f"**{title}**" in text
     assert "| pointnet |" not in text, "whose card it is need not be said in every line"
+    assert "goes on from" not in text
     told = Predictor.load(package / "some-pointnet.safetensors", gate=None)(scene_dataset.raw_cloud(0))
     assert told.opening_angle_deg is not None
+
+    longer = {"name": "longer", "start_from": str(runs / "mixture"), "recipe_changes": RECIPE}
+    compare(Experiment.model_validate(common | longer), runs / "longer")
+    publish(runs / "longer", results / "longer")
+    tool.main(str(runs / "longer"), "longer-")
+    text = (package / "longer-pointnet.md").read_text(encoding="utf-8")
+    assert "goes on from the weights of experiments/mixture.toml" in text

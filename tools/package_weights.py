@@ -94,12 +94,14 @@ def main(folder: str, prefix: str = "") -> None:
             }
         )
         save_weights(target, network, card, half=True)
-        metrics, recipe = run.read_metrics(), read_json(run.config)["recipe"]
+        metrics, config = run.read_metrics(), read_json(run.config)
+        recipe = config["recipe"]
         text = template(found.card).render(
             name=name,
             title=NAMES[network_name],
             parameters=sum(p.numel() for p in network.parameters()),
             recipe=recipe,
+            begun=config.get("start_from") and Path(asked["start_from"]).name,
             augmentation={
                 key.replace("_", " "): value
                 for key, value in recipe["augmentation"].items()
