@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -159,6 +160,10 @@ def test_weights_that_have_learned_what_is_tested_are_not_gone_on_from(
         again = experiment(small_dataset, start_from=str(tmp_path / name))
         with pytest.raises(RunError, match="which is tested here") if complains else nullcontext():
             prepare_comparison(again, tmp_path / f"after-{name}")
+    same_names = tmp_path / "of-another-seed"
+    shutil.copytree(small_dataset.folder, same_names)
+    elsewhere = {"start_from": str(tmp_path / "all"), "dataset": str(same_names)}
+    prepare_comparison(experiment(small_dataset).model_copy(update=elsewhere), tmp_path / "elsewhere")
 
 
 def test_training_on_everything_tests_nothing(small_dataset: PreparedDataset, tmp_path: Path) -> None:

@@ -209,9 +209,11 @@ def prepare_comparison(experiment: Experiment, folder: Path) -> None:
         write_splits(splits_path, draw_splits(dataset.rows, experiment.protocol, experiment.seed))
     if experiment.start_from is not None:
         before = Path(experiment.start_from)
-        if not set(experiment.networks) & set(read_comparison(before)["networks"]):
+        earlier = read_comparison(before)
+        if not set(experiment.networks) & set(earlier["networks"]):
             raise RunError(f"{before}: has none of {', '.join(experiment.networks)} to go on from")
-        _check_unseen(read_splits(splits_path), before)
+        if earlier["dataset"] == experiment.dataset:  # in another, the same name is another sample
+            _check_unseen(read_splits(splits_path), before)
     write_json(path, settings)
 
 
