@@ -112,7 +112,7 @@ def test_weights_that_were_tested_say_how_well_and_when_they_are_unsure(
         "heads": ("door", "angle"),
     }
     runs, results = tmp_path / "runs", tmp_path / "results"
-    for folder in (runs / "mixture", runs / "points" / "as-trained-128"):
+    for folder in (runs / "mixture", runs / "longer", runs / "points" / "as-trained-128"):
         write_splits(folder / "splits.csv", [fold])
     experiment = Experiment.model_validate(common | {"name": "mixture", "recipe_changes": RECIPE})
     compare(experiment, runs / "mixture")
