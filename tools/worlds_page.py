@@ -43,6 +43,13 @@ STUDIES = ("mixture-points", "transfer", "augmentation")  # shown below, once th
 ANGLES, CLUTTER = (f"transfer/mixture/{name}" for name in ("angles", "cluttered"))
 
 
+class Published(NamedTuple):
+    """A published comparison, and the rows of what it tested."""
+
+    results: ComparisonResults
+    dataset: PreparedDataset
+
+
 class Target(NamedTuple):
     """Something that was asked for, and how well a network does at it."""
 
@@ -139,7 +146,12 @@ def write_worlds_page(results_folder: Path, reports_folder: Path, page: Path) ->
     mixture = results_folder / MIXTURE
     if not mixture.is_dir() or not whole_folds(mixture):
         return
-    results = load_results(mixture, rows_of(mixture, results_folder))
+    published = {
+        where: _open(results_folder / where, results_folder)
+        for where in (MIXTURE, ANGLES, CLUTTER)
+        if (results_folder / where).is_dir()
+    }
+    results, dataset = published[MIXTURE]
     tables = {
         name: {
             path.stem: path.read_text(encoding="utf-8").strip()
@@ -149,17 +161,17 @@ def write_worlds_page(results_folder: Path, reports_folder: Path, page: Path) ->
     }
     rules = results.comparison.rules
     networks = tuple(method for method in results.networks if method not in rules)
-    rows = {row["sample_id"]: row for row in open_dataset(rows_of(mixture, results_folder)).rows}
+    rows = {row["sample_id"]: row for row in dataset.rows}
     cases = cases_table(results, rows, results.networks, CASES)
     render(
         "worlds.md.j2",
         page,
         results=results,
-        targets=targets_table(results_folder, networks).to_markdown().strip(),
+        targets=targets_table(published, networks).to_markdown().strip(),
         mixture=MIXTURE,
         tables=tables,
-        by_angle=_by_factor(results_folder, ANGLES, ANGLE),
-        by_occlusion=_by_factor(results_folder, CLUTTER, OCCLUSION),
+        by_angle=_by_factor(published.get(ANGLES), ANGLE),
+        by_occlusion=_by_factor(published.get(CLUTTER), OCCLUSION),
         trained=max(int(run.metric("train_samples")) for run in results.runs if run.network in networks),
         cases=cases.to_markdown().strip() if rules else "",
         rules=rules,
@@ -170,13 +182,16 @@ def write_worlds_page(results_folder: Path, reports_folder: Path, page: Path) ->
     )
 
 
-def _by_factor(results_folder: Path, where: str, factor: str) -> str:
-    """Accuracy of every method by a factor, of test clouds made for it, as Markdown; "" until that is published."""
-    comparison = results_folder / where
-    if not comparison.is_dir():
-        return ""
+def _open(comparison: Path, results_folder: Path) -> Published:
     folder = rows_of(comparison, results_folder)
-    results, dataset = load_results(comparison, folder), open_dataset(folder)
+    return Published(load_results(comparison, folder), open_dataset(folder))
+
+
+def _by_factor(published: Published | None, factor: str) -> str:
+    """Accuracy of every method by a factor, of test clouds made for it, as Markdown; "" until that is published."""
+    if published is None:
+        return ""
+    results, dataset = published
     bins = [each for each in factor_bins(results, dataset) if each.factor == factor]
     accuracy = {(each.method, each.low): number(each.right / each.samples) for each in bins}
     first = [each for each in bins if each.method == results.networks[0]]
@@ -205,15 +220,18 @@ def _lost(cases: Table, rules: Sequence[str]) -> list[str]:
     ]
 
 
-def targets_table(results_folder: Path, networks: Sequence[str]) -> Table:
-    """What was asked for, and what every network reaches; what is not published yet nobody knows."""
+def targets_table(published: Mapping[str, Published], networks: Sequence[str]) -> Table:
+    """What was asked for, and what every network reaches; what is not published yet nobody knows.
+
+    Args:
+        published: comparisons by where they lie in the folder of everything published.
+        networks: in the order of columns.
+    """
     rows = []
     for target in TARGETS:
-        comparison = results_folder / target.where
         found = dict.fromkeys(networks, float("nan"))
-        if comparison.is_dir():
-            folder = rows_of(comparison, results_folder)
-            results, dataset = load_results(comparison, folder), open_dataset(folder)
+        if target.where in published:
+            results, dataset = published[target.where]
             found |= {
                 network: target.found(results, dataset, network)
                 for network in results.networks
