@@ -84,6 +84,10 @@ def test_a_network_may_differ_and_options_win_over_that_too(tmp_path: Path) -> N
         ('dataset = "d"\nprotocol = "all"', "protocol all has one fold: set folds = 1"),
         ('dataset = "d"\nprotocol = "unseen"', "protocol unseen has one fold: set folds = 1"),
         ('dataset = "d"\nprotocol = "unseen"\nfolds = 1', "protocol unseen trains nothing"),
+        (
+            'dataset = "d"\nheads = ["door"]\nrecipe_changes = {loss_weights = {angle = 2}}',
+            "has no head 'angle': it learns state, door",
+        ),
         ('dataset = "d"\nfolds = 6', "folds: Input should be less than or equal to 5"),
     ],
 )

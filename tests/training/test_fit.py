@@ -125,10 +125,10 @@ def test_a_stopped_run_ends_as_if_it_had_not_been(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def stop(self: Any, epoch: int, loader: Any) -> tuple[float, float]:
+    def stop(self: Any, epoch: int, *rest: Any) -> tuple[float, float]:
         if epoch == stop_after:
             raise KeyboardInterrupt
-        return original(self, epoch, loader)
+        return original(self, epoch, *rest)
 
     original = fit_module._Trainer._epoch
     with monkeypatch.context() as patch:
@@ -234,6 +234,31 @@ def test_only_full_resolution_may_be_the_best_epoch(
     assert metrics["best_epoch"] == 2
 
 
+def test_the_checkpoint_of_a_version_with_one_optimizer_is_continued(
+    finished: Path,
+    small_dataset: PreparedDataset,
+    roles: dict[str, Role],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def stop(self: Any, epoch: int, *rest: Any) -> tuple[float, float]:
+        if epoch == 2:
+            raise KeyboardInterrupt
+        return original(self, epoch, *rest)
+
+    original = fit_module._Trainer._epoch
+    with monkeypatch.context() as patch:
+        patch.setattr(fit_module._Trainer, "_epoch", stop)
+        with pytest.raises(KeyboardInterrupt):
+            fit(config(), small_dataset, roles, tmp_path / "run")
+    checkpoint = tmp_path / "run" / "checkpoint.pt"
+    state = torch.load(checkpoint, weights_only=True)
+    (state["optimizer"],) = state.pop("optimizers")
+    torch.save(state, checkpoint)
+    fit(config(), small_dataset, roles, tmp_path / "run")
+    assert results(tmp_path / "run") == results(finished)
+
+
 def test_a_loss_that_is_no_number_stops_the_run(
     small_dataset: PreparedDataset, roles: dict[str, Role], tmp_path: Path
 ) -> None:
@@ -272,7 +297,7 @@ def test_a_limit_of_clouds_makes_epochs_shorter_and_the_schedule_with_them(
     step = fit_module._Trainer._step
 
     def counted(self: Any, batch: Any) -> float:
-        rates.append(self.optimizer.param_groups[0]["lr"])
+        rates.append(self.optimizers[0].param_groups[0]["lr"])
         return step(self, batch)
 
     monkeypatch.setattr(fit_module._Trainer, "_step", counted)
@@ -395,6 +420,28 @@ def test_heads_are_trained_jointly_and_answer_in_metres(
     loaded, card = load_weights(tmp_path / "weights.safetensors")
     assert card.heads == heads
     assert list(loaded.heads) == list(heads)
+
+
+def test_a_head_without_weight_teaches_nothing(
+    scene_dataset: PreparedDataset, scene_roles: dict[str, Role], tmp_path: Path
+) -> None:
+    changes = {"epochs": 1, "augmentation": Augmentation()}
+    ends = []
+    for weights in ({}, {"hinge": 0.0}, {"state": 4.0, "hinge": 0.0}):
+        recipe = RECIPE.model_copy(update=changes | {"weight_decay": 0.0, "loss_weights": weights})
+        folder = tmp_path / str(len(ends))
+        fit(config(heads=("door", "hinge"), recipe=recipe), scene_dataset, scene_roles, folder)
+        ends.append(load_weights(folder / "weights.safetensors")[0])
+
+    def hinge(network: torch.nn.Module) -> torch.Tensor:
+        return network.get_parameter("heads.hinge.linear.weight")
+
+    def head(network: torch.nn.Module) -> torch.Tensor:
+        return torch.cat([each.flatten() for each in network.get_submodule("head").parameters()])
+
+    assert not torch.equal(hinge(ends[0]), hinge(ends[1]))
+    assert torch.equal(hinge(ends[1]), hinge(ends[2])), "as it began"
+    assert not torch.equal(head(ends[1]), head(ends[2]))
 
 
 def test_a_run_with_heads_is_another_run(

@@ -26,7 +26,7 @@ from doorstate.errors import ConfigError, RunError, first_problem
 from doorstate.jobs import Progress, default_workers, no_progress, run_pieces
 from doorstate.models import Frozen
 from doorstate.networks import create_network, list_networks, network_class
-from doorstate.networks.heads import give_heads
+from doorstate.networks.heads import STATE, give_heads
 from doorstate.rules import create_rule
 from doorstate.training.fit import RunConfig, fit, threads
 from doorstate.training.recipes import Recipe, find_recipe
@@ -95,6 +95,12 @@ class Experiment(Frozen):
                 raise ConfigError(
                     f"experiment {self.name}: protocol {UNSEEN} trains nothing: set recipe_changes.epochs = 0"
                 )
+            for head in self.recipe_of(network).loss_weights:
+                if head not in (STATE, *self.heads):
+                    raise ConfigError(
+                        f"experiment {self.name}: loss_weights: {network} has no head {head!r}: "
+                        f"it learns {', '.join((STATE, *self.heads))}"
+                    )
         for rule in self.rules:
             create_rule(rule)
 

@@ -39,6 +39,7 @@ from doorstate.networks.layers import set_batchnorm
 from doorstate.training.answers import in_metres, write_answers
 from doorstate.training.card import WeightsCard
 from doorstate.training.environment import bf16_is_quick, compiled, describe_environment, keep_freed_memory
+from doorstate.training.optimizers import create_optimizers
 from doorstate.training.recipes import Recipe, batchnorm_momentum, learning_rate, resolution_of_epoch
 from doorstate.training.run_folder import RunFolder, write_predictions
 from doorstate.training.weights import load_into, read_card, save_weights
@@ -169,10 +170,11 @@ def confusion_counts(parts: Tensor, said: Tensor) -> np.ndarray:
 
 
 class _Begun(NamedTuple):
-    """How far an epoch is: iterations done, their losses, and torch's generator for what is left."""
+    """How far an epoch is: losses of the iterations done, torch's generator for what is left, and seconds it took."""
 
     losses: list[float]
     generator: torch.Tensor
+    seconds: float = 0.0
 
 
 class _Trainer:
@@ -193,7 +195,7 @@ class _Trainer:
         if config.recipe.compile:
             self.state_loss = compiled(self.state_loss)
             self.joint_losses = compiled(self.joint_losses)
-        self.optimizer = _optimizer(config.recipe, network)
+        self.optimizers = create_optimizers(config.recipe, network)
         self.log: list[dict[str, float]] = []
         self.best: tuple[float, float] = (-1.0, -math.inf)
         self.best_epoch = -1
@@ -207,7 +209,7 @@ class _Trainer:
             save_weights(self.run.weights, self.network, read_card(Path(str(self.config.start_from))))
         resolution = loader = validation = None
         for epoch in range(len(self.log), recipe.epochs):
-            started = time.perf_counter()
+            started = time.perf_counter() - (0.0 if self.begun is None else self.begun.seconds)
             wanted = resolution_of_epoch(recipe, epoch, num_points)
             if loader is None or validation is None or wanted != resolution:
                 resolution = wanted
@@ -218,7 +220,7 @@ class _Trainer:
                     CloudLoader(self.dataset, self.samples[role], resolution.points, find, self.config.heads)
                     for role, find in (("train", kept), ("val", search))
                 )
-            rate, loss = self._epoch(epoch, loader)
+            rate, loss = self._epoch(epoch, loader, started)
             line = {
                 "epoch": epoch,
                 "points": resolution.points,
@@ -262,13 +264,13 @@ class _Trainer:
                     metrics["test_part_counts"] = found.part_counts.tolist()
         return metrics
 
-    def _epoch(self, epoch: int, loader: CloudLoader) -> tuple[float, float]:
+    def _epoch(self, epoch: int, loader: CloudLoader, started: float) -> tuple[float, float]:
         config, recipe = self.config, self.config.recipe
         torch.manual_seed(_seed(config, epoch + 1))  # dropout
         per_epoch = max(1, min(len(loader), recipe.clouds_per_epoch or len(loader)) // recipe.batch_size)
         losses: list[float] = []
         if self.begun is not None:
-            losses, generator = self.begun
+            losses, generator = self.begun.losses, self.begun.generator
             torch.set_rng_state(generator)
             self.begun = None
         self.network.train()
@@ -283,8 +285,9 @@ class _Trainer:
         )
         for iteration, batch in enumerate(batches, start=epoch * per_epoch + len(losses)):
             rate = learning_rate(recipe, iteration, per_epoch, config.num_points)
-            for group in self.optimizer.param_groups:
-                group["lr"] = rate
+            for optimizer in self.optimizers:
+                for group in optimizer.param_groups:
+                    group["lr"] = rate
             momentum = batchnorm_momentum(recipe, iteration, per_epoch)
             if momentum is not None:
                 set_batchnorm(self.network, momentum=momentum)
@@ -294,7 +297,7 @@ class _Trainer:
             losses.append(self._step(self.fabric.to_device(batch)))
             if time.perf_counter() - saved > _SAVE_EVERY_S:
                 saved = time.perf_counter()
-                self._checkpoint(_Begun(losses, torch.get_rng_state()))
+                self._checkpoint(_Begun(losses, torch.get_rng_state(), saved - started))
         mean = float(np.mean(losses))
         if not math.isfinite(mean):
             raise RunError(f"{self.run.path}: the loss is {mean} in epoch {epoch}; try a lower learning rate")
@@ -307,7 +310,7 @@ class _Trainer:
         return augmentation.is_rigid
 
     def _step(self, batch: Batch) -> float:
-        self.optimizer.zero_grad(set_to_none=True)
+        self.network.zero_grad(set_to_none=True)
         smoothing = self.config.recipe.label_smoothing
         with self.fabric.autocast():
             if self.config.heads:
@@ -319,19 +322,21 @@ class _Trainer:
                     batch.neighbourhoods,
                     self.config.recipe.part_points,
                 )
-                loss = torch.stack(list(losses.values())).sum()
+                weights = self.config.recipe.loss_weights
+                loss = torch.stack([weights.get(name, 1.0) * each for name, each in losses.items()]).sum()
             else:
                 loss, _ = self.state_loss(batch.points, batch.labels, smoothing, batch.neighbourhoods)
         loss.backward()  # type: ignore[no-untyped-call]
         if self.config.recipe.gradient_clip is not None:
             torch.nn.utils.clip_grad_norm_(self.network.parameters(), self.config.recipe.gradient_clip)
-        self.optimizer.step()
+        for optimizer in self.optimizers:
+            optimizer.step()
         return float(loss.detach())
 
     def _checkpoint(self, begun: _Begun | None = None) -> None:
         state = {
             "network": self.network.state_dict(),
-            "optimizer": self.optimizer.state_dict(),
+            "optimizers": [optimizer.state_dict() for optimizer in self.optimizers],
             "log": self.log,
             "best": list(self.best),
             "best_epoch": self.best_epoch,
@@ -351,7 +356,10 @@ class _Trainer:
                 f"{self.run.checkpoint}: cannot be read ({error}); delete the run's folder"
             ) from error
         self.network.load_state_dict(state["network"])
-        self.optimizer.load_state_dict(state["optimizer"])
+        # Before there were several, it was called otherwise.
+        kept = state["optimizers"] if "optimizers" in state else [state["optimizer"]]
+        for optimizer, values in zip(self.optimizers, kept, strict=True):
+            optimizer.load_state_dict(values)
         self.log, self.best_epoch = state["log"], state["best_epoch"]
         self.best = (state["best"][0], state["best"][1])
         self.begun = _Begun(*state["begun"]) if state.get("begun") else None
@@ -389,16 +397,6 @@ def _start_from(network: PointNetwork, config: RunConfig) -> None:
 def _network_options(config: RunConfig) -> dict[str, Any]:
     eps = config.recipe.batchnorm_eps
     return config.network_options | ({} if eps is None else {"batchnorm_eps": eps})
-
-
-def _optimizer(recipe: Recipe, network: PointNetwork) -> torch.optim.Optimizer:
-    parameters = network.parameters()
-    if recipe.optimizer == "sgd":
-        return torch.optim.SGD(
-            parameters, recipe.learning_rate, momentum=recipe.momentum, weight_decay=recipe.weight_decay
-        )
-    kind = torch.optim.AdamW if recipe.optimizer == "adamw" else torch.optim.Adam
-    return kind(parameters, recipe.learning_rate, eps=recipe.adam_eps, weight_decay=recipe.weight_decay)
 
 
 def _precision(recipe: Recipe) -> Any:

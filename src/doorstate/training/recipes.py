@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from typing import Any, Literal, NamedTuple
 
-from pydantic import Field, SerializerFunctionWrapHandler, model_serializer
+from pydantic import Field, NonNegativeFloat, SerializerFunctionWrapHandler, model_serializer
 
 from doorstate.clouds.augment import Augmentation
 from doorstate.clouds.preparation import NUM_POINTS
@@ -36,7 +36,7 @@ class Recipe(Frozen):
     epochs: int = Field(default=30, ge=0)  # 0 tests the weights that a run starts from
     clouds_per_epoch: int | None = Field(default=None, ge=2)  # drawn anew for every epoch; None is all
     batch_size: int = Field(default=16, ge=2)
-    optimizer: Literal["adamw", "adam", "sgd"] = "adamw"
+    optimizer: Literal["adamw", "adam", "sgd", "muon"] = "adamw"
     learning_rate: float = Field(default=2e-3, gt=0)
     min_learning_rate: float = Field(default=0.0, ge=0)
     weight_decay: float = Field(default=0.05, ge=0)
@@ -56,15 +56,19 @@ class Recipe(Frozen):
     part_points: int | None = Field(
         default=None, ge=1
     )  # of each cloud that parts are learned on; None is all
+    # What the loss of a head, or of the "state", counts in the sum of them; 1 where nothing is said.
+    loss_weights: dict[str, NonNegativeFloat] = Field(default_factory=dict)
     precision: Literal["auto", "fp32", "bf16"] = "auto"
     compile: bool = False  # torch.compile; docs/speed.md has what it brings
 
     @model_serializer(mode="wrap")
     def _without_what_is_not_given(self, fields: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        # Runs that were begun before there were limits go on.
-        limits = ("clouds_per_epoch", "part_points")
+        # Runs that were begun before there were these go on.
+        later = ("clouds_per_epoch", "part_points", "loss_weights")
         return {
-            name: value for name, value in fields(self).items() if name not in limits or value is not None
+            name: value
+            for name, value in fields(self).items()
+            if name not in later or value not in (None, {})
         }
 
 
