@@ -43,6 +43,8 @@ def test_a_door_beside_scenes_is_rendered_again_too(
 ) -> None:
     varied = scene_dataset.folder.parent / "varied-160"
     joined = join_datasets([small_dataset.folder, varied], tmp_path / "joined")
+    again = join_datasets([scene_dataset.folder, small_dataset.folder], tmp_path / "again")
+    assert again.description.source == "varied + no-door + " + small_dataset.description.source
     raw = joined.raw_cloud(4)
     assert np.array_equal(raw, small_dataset.raw_cloud(4), equal_nan=True)
 

@@ -21,6 +21,8 @@ from doorstate.dataset.store import (
 from doorstate.errors import ConfigError, DatasetError
 from doorstate.files import atomic_path, is_vacant, write_csv
 
+_BESIDE = " + "  # between the sources of a joined data set, each named once
+
 
 def join_datasets(sources: Sequence[Path], folder: Path) -> PreparedDataset:
     """Write the samples of prepared data sets behind one another; parts of points if all of them know theirs.
@@ -54,11 +56,12 @@ def join_datasets(sources: Sequence[Path], folder: Path) -> PreparedDataset:
         every = [dataset.parts_of(np.arange(len(dataset)), num_points) for dataset in datasets]
         _stack(folder / PARTS, every)
     write_csv(folder / MANIFEST, rows)
+    parts = [dataset.description.source for dataset in datasets]
     limits_m = [dataset.description.max_depth_m for dataset in datasets]
     kinds = {dataset.description.kind for dataset in datasets}
     DatasetDescription(
         kind="simulated" if kinds == {"simulated"} else "imported",
-        source=" + ".join(dataset.description.source for dataset in datasets),
+        source=_BESIDE.join(dict.fromkeys(each for part in parts for each in part.split(_BESIDE))),
         num_points=num_points,
         samples=len(rows),
         max_depth_m=None if None in limits_m else max(limit_m for limit_m in limits_m if limit_m),
