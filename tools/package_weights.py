@@ -31,7 +31,7 @@ from doorstate.clouds.augment import Augmentation
 from doorstate.dataset.store import open_dataset
 from doorstate.evaluation.calibration import calibrate, reliability
 from doorstate.evaluation.factors import factors_table, kinds_table
-from doorstate.evaluation.head_tables import answers_table, presence_table
+from doorstate.evaluation.head_tables import answers_table, four_answers_table, presence_table
 from doorstate.evaluation.metrics import scores
 from doorstate.evaluation.resolution import fewest_points
 from doorstate.evaluation.results import Answers, ComparisonResults, Predictions, load_results
@@ -83,8 +83,8 @@ def main(folder: str, prefix: str = "") -> None:
         if not (run.finished and run.weights.is_file()):
             print(f"{name}: not trained in {folder}, left as it is")
             continue
-        found = evidence(network_name)
         network, card = load_weights(run.weights)
+        found = evidence(network_name, card.num_points)
         target = WEIGHTS / f"{name}.safetensors"
         card = card.model_copy(
             update={
@@ -128,19 +128,19 @@ def main(folder: str, prefix: str = "") -> None:
         sys.exit(f"more than {_MANY / 1e6:.0f} MB: too much for the package")
 
 
-def _of_recipe() -> Callable[[str], Evidence]:
+def _of_recipe() -> Callable[[str, int], Evidence]:
     """Scores of the recipe, cross-validated over the folds of two protocols."""
     rows = RESULTS / "ogurob-4096"
     paper, by_pose = (load_results(RESULTS / name, rows) for name in ("paper", "by-pose"))
 
-    def evidence(network: str) -> Evidence:
+    def evidence(network: str, trained_points: int) -> Evidence:
         calibrated = calibrate(paper, network)
         if calibrated is None:
             sys.exit(f"results/paper: no validation answers of {network}")
         return Evidence(
             round(median(calibrated.temperatures), 4),
             0.0,
-            _default_points("by-pose", network),
+            _default_points("by-pose", network, trained_points),
             "ogurob_card.md.j2",
             {
                 "tables": _tables_of(network, _study_tables("by-pose")),
@@ -155,7 +155,7 @@ def _of_recipe() -> Callable[[str], Evidence]:
     return evidence
 
 
-def _of_weights(experiment: str) -> Callable[[str], Evidence]:
+def _of_weights(experiment: str) -> Callable[[str, int], Evidence]:
     """Scores of the very weights on test samples of their own, in their world and in others."""
     comparison = RESULTS / experiment
     if not comparison.is_dir():
@@ -163,7 +163,7 @@ def _of_weights(experiment: str) -> Callable[[str], Evidence]:
     rows = rows_of(comparison, RESULTS)
     results, dataset = load_results(comparison, rows), open_dataset(rows)
 
-    def evidence(network: str) -> Evidence:
+    def evidence(network: str, trained_points: int) -> Evidence:
         (run,) = results.runs_of(network)
         calibrated = calibrate(results, network)
         if calibrated is None or run.validation is None:
@@ -177,12 +177,13 @@ def _of_weights(experiment: str) -> Callable[[str], Evidence]:
         )
         right = calibrated.scaled.argmax(axis=1) == calibrated.true
         tables = [
-            make(results, dataset) for make in (answers_table, presence_table, kinds_table, factors_table)
+            make(results, dataset)
+            for make in (answers_table, four_answers_table, presence_table, kinds_table, factors_table)
         ]
         return Evidence(
             temperature,
             threshold,
-            _default_points(experiment, network),
+            _default_points(experiment, network, trained_points),
             "worlds_card.md.j2",
             {
                 "error": reliability(calibrated.true, calibrated.scaled).error,
@@ -216,11 +217,11 @@ def _study_tables(experiment: str) -> Iterator[Table]:
     return (study_table(asked, RESULTS) for asked in _studies(experiment))
 
 
-def _default_points(experiment: str, network: str) -> int | None:
+def _default_points(experiment: str, network: str, trained: int) -> int | None:
     """As few points as lose nothing, as the study of an experiment's weights tells; None if it tells nothing."""
     for asked in _studies(experiment):
         if asked.command == "resolution":
-            return fewest_points(resolution_results(asked, RESULTS), network, _FEWEST, _LOST)
+            return fewest_points(resolution_results(asked, RESULTS), network, _FEWEST, trained, _LOST)
     return None
 
 

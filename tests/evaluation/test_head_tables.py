@@ -13,9 +13,15 @@ import pytest
 from doorstate.dataset.splits import draw_splits, write_splits
 from doorstate.dataset.store import PreparedDataset
 from doorstate.evaluation.factors import kinds_table
-from doorstate.evaluation.head_tables import answers_table, parts_table, presence_table
+from doorstate.evaluation.head_tables import (
+    answer_errors,
+    answers_table,
+    four_answers_table,
+    parts_table,
+    presence_table,
+)
 from doorstate.evaluation.report import write_everything
-from doorstate.evaluation.results import ComparisonResults, load_results
+from doorstate.evaluation.results import Answers, ComparisonResults, load_results
 from doorstate.evaluation.rule_tables import angle_table
 from doorstate.evaluation.table import UNDEFINED, Table
 from doorstate.files import write_csv
@@ -125,6 +131,25 @@ def test_presence_is_counted_by_what_is_there(
     assert {row["kind"] for row in empty} == {
         r["scene_kind"] for r in scene_dataset.rows if r["state"] == NO_DOOR
     }
+
+
+def test_no_door_is_an_answer_beside_the_states(
+    results: ComparisonResults, scene_dataset: PreparedDataset
+) -> None:
+    row = only_row(four_answers_table(results, scene_dataset))
+    assert row["samples"] == "36"
+    assert {row[f"right of {state}"] for state in STATES} == {"1.0000"}
+    assert row["right of no_door"] == "0.5000"  # of 12
+    assert row["mean"] == f"{(3 + 0.5) / 4:.4f}"
+    assert row["of all"] == f"{(24 + 6) / 36:.4f}"
+
+
+def test_an_angle_is_off_by_no_more_than_half_a_turn(scene_dataset: PreparedDataset) -> None:
+    row = next(row for row in scene_dataset.rows if row["state"] == "open" and row["opening_angle_deg"])
+    true = float(row["opening_angle_deg"])
+    for said, off in ((true + 10, 10), (true - 10, 10), (true + 350, 10), (true - 190, 170)):
+        given = Answers((row["sample_id"],), {"opening_angle_deg": np.array([said])})
+        assert answer_errors(given, scene_dataset)["open"] == pytest.approx(off)
 
 
 def test_parts_by_hand(results: ComparisonResults) -> None:

@@ -87,5 +87,11 @@ def test_a_part_counts_once_all_its_folds_are_there(study: Callable[..., Path]) 
 def test_the_fewest_points_that_lose_nothing(macro_f1: dict[int, float], enough: int | None) -> None:
     found = {("dgcnn", points): value for points, value in macro_f1.items()}
     results = ResolutionResults(("dgcnn",), tuple(macro_f1), found, {}, {})
-    assert fewest_points(results, "dgcnn", fewest=512, lost=0.002) == enough
-    assert fewest_points(results, "pointnet", fewest=512, lost=0.002) is None
+    assert fewest_points(results, "dgcnn", fewest=512, trained=4096, lost=0.002) == enough
+    assert fewest_points(results, "pointnet", fewest=512, trained=4096, lost=0.002) is None
+
+
+def test_more_points_than_weights_were_trained_with_are_no_default() -> None:
+    found = {("dgcnn", 512): 0.88, ("dgcnn", 1024): 0.90, ("dgcnn", 4096): 0.95}
+    results = ResolutionResults(("dgcnn",), (512, 1024, 4096), found, {}, {})
+    assert fewest_points(results, "dgcnn", fewest=512, trained=1024, lost=0.002) == 1024

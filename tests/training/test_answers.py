@@ -31,6 +31,12 @@ def test_targets_come_back_as_the_manifest_has_them(scene_dataset: PreparedDatas
     assert_allclose(columns["p_hinge_left"][~np.isnan(columns["p_hinge_left"])], left)
 
 
+def test_an_angle_that_no_door_has_becomes_the_nearest_that_one_has() -> None:
+    said = np.radians(np.array([[-5.0], [-89.0], [-91.0], [-179.0], [0.0], [75.0], [180.0], [np.nan]]))
+    columns = in_metres({"angle": said.astype(np.float32)}, np.zeros((8, 3), np.float32))
+    assert_allclose(columns["opening_angle_deg"], [0, 0, 180, 180, 0, 75, 180, np.nan], atol=1e-4)
+
+
 def test_heads_that_say_the_target_are_decoded_to_it() -> None:
     angle, yaw = torch.tensor([[1.1]]), 2.5
     outputs = torch.cat([angle.cos(), angle.sin()], dim=1)

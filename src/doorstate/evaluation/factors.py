@@ -53,11 +53,12 @@ def _heading_off_deg(row: Mapping[str, str]) -> float:
 
 
 ANGLE, OCCLUSION = "opening angle, degrees", "occluded share of the door"
+SHARE = "opened share of a sliding door, %"
 FACTORS = (
     Factor(
         ANGLE,
         _column("opening_angle_deg"),
-        (0, 3, 9, 15, *range(25, 66, 10), 70, *range(75, 116, 10)),
+        (0, 3, 9, 15, *range(25, 66, 10), 70, *range(75, 116, 10), 170),
     ),
     Factor("distance to the door, m", _column("distance_m"), tuple(np.arange(1.5, 3.51, 0.25).tolist())),
     Factor(
@@ -67,7 +68,12 @@ FACTORS = (
     Factor("camera height, m", _column("camera_height_m"), (0.25, 0.4, 0.6, 0.8, 1.0, 1.2)),
     Factor("camera pitch, degrees", _column("pitch_deg"), (-10, -6, -2, 2, 6, 10)),
     Factor("pixels of the leaf", _column("visible_leaf_px"), (0, 5e3, 1e4, 2e4, 3e4, 4e4, 6e4, 1e5, 2e5)),
-    Factor(OCCLUSION, _column("occluded_share"), (0, 0.001, 0.25, 0.5, 0.75)),
+    Factor(OCCLUSION, _column("occluded_share"), (0, 0.01, 0.25, 0.5, 0.75, 1)),
+    Factor(
+        SHARE,
+        lambda row: 100 * _column("opening_share")(row),
+        (0, 3, 11.5, 20, 35, 50, 65, 72.5, 80, 90, 100),
+    ),
 )
 
 
@@ -95,8 +101,21 @@ def _places(values: Floats, edges: tuple[float, ...]) -> Indices:
     return places
 
 
-KINDS = ("door_kind", "swing", "sensor", "occluded_bin", "ambiguous")
-"""Columns of the manifest that name a kind of sample."""
+def _sensor(row: Mapping[str, str]) -> str:
+    """A sensor and the preset whose scenes it saw: one camera may have seen other scenes than the next."""
+    preset = row.get("scene_id", "").rsplit("-", 2)[0]  # of PRESET-SEED-INDEX
+    sensor = row.get("sensor", "")
+    return f"{sensor}, {preset}" if sensor and preset else sensor
+
+
+KINDS: dict[str, Callable[[Mapping[str, str]], str]] = {
+    "door_kind": lambda row: row.get("door_kind", ""),
+    "swing": lambda row: row.get("swing", ""),
+    "sensor, preset": _sensor,
+    "occluded_bin": lambda row: row.get("occluded_bin", ""),
+    "ambiguous": lambda row: row.get("ambiguous", ""),
+}
+"""What kind of sample a row of the manifest is of, "" where it does not know."""
 
 
 def kinds_table(results: ComparisonResults, dataset: PreparedDataset) -> Table:
@@ -105,8 +124,8 @@ def kinds_table(results: ComparisonResults, dataset: PreparedDataset) -> Table:
     for method in results.networks:
         predictions = results.pooled(method)
         manifest = rows_of(dataset, predictions)
-        for kind in KINDS:
-            values = np.array([row.get(kind, "") for row in manifest])
+        for kind, of in KINDS.items():
+            values = np.array([of(row) for row in manifest])
             known = sorted(set(values) - {""})
             for value in known if len(known) > 1 else ():
                 right = predictions.right[values == value]

@@ -14,7 +14,7 @@ from doorstate.evaluation.results import Answers, ComparisonResults
 from doorstate.evaluation.stratum_tables import rows_of
 from doorstate.evaluation.table import Table, number
 from doorstate.simulation.manifest import numbers
-from doorstate.types import NO_DOOR, SURE, Part
+from doorstate.types import NO_DOOR, STATES, SURE, Part
 
 _ERRORS = {
     "door, AUROC": 4,
@@ -61,17 +61,18 @@ def answer_errors(given: Answers, dataset: PreparedDataset) -> dict[str, float]:
     def off(name: str, *others: str) -> Floats:
         return np.abs(given.columns.get(name, math.nan) - numbers(manifest, name, *others))
 
+    def turned(name: str) -> Floats:
+        difference = given.columns.get(name, math.nan) - numbers(manifest, name)
+        return np.abs((difference + 180) % 360 - 180)
+
     state = np.array([row["state"] for row in manifest])
-    angle = off("opening_angle_deg")
+    angle = turned("opening_angle_deg")
     hinge = np.array([row.get("hinge") or row.get("door.hinge", "") for row in manifest])
     said_left = given.columns.get("p_hinge_left", np.full(len(state), math.nan))
     hinge_right = np.where(
         (hinge != "") & ~np.isnan(said_left), (said_left >= SURE) == (hinge == "left"), math.nan
     )
     place = np.hypot(off("door_x_m"), off("door_y_m"))
-    turn = np.abs(
-        (given.columns.get("door_yaw_deg", math.nan) - numbers(manifest, "door_yaw_deg") + 180) % 360 - 180
-    )
     found = (
         _auroc(given, state),
         _mean(angle[state == "semi_open"]),
@@ -80,7 +81,7 @@ def answer_errors(given: Answers, dataset: PreparedDataset) -> dict[str, float]:
         _mean(hinge_right[(state == "semi_open") | (state == "open")]),
         _quantile(place, 0.5),
         _quantile(place, 0.9),
-        _quantile(turn, 0.5),
+        _quantile(turned("door_yaw_deg"), 0.5),
         _mean(off("opening_width_m", "door.opening_width_m")),
         _mean(off("passable_width_m")),
     )
@@ -108,6 +109,37 @@ def presence_table(results: ComparisonResults, dataset: PreparedDataset) -> Tabl
         ("network", "a door", "kind", "samples", "said yes", "share"),
         tuple(rows),
         text_columns=3,
+    )
+
+
+def four_answers_table(results: ComparisonResults, dataset: PreparedDataset) -> Table:
+    """A state or *no door*, as a predictor answers: of what seems to be no door no state is said."""
+    rows = []
+    for method in results.networks:
+        given = results.answers(method)
+        if given is None or "p_door" not in given.columns:
+            continue
+        state = np.array([row["state"] for row in rows_of(dataset, given)])
+        right_state = results.pooled(method).right_by_sample
+        door = given.columns["p_door"] >= SURE
+        right = np.where(
+            state == NO_DOOR, ~door, door & [right_state.get(name, False) for name in given.sample_ids]
+        )
+        shares = [_mean(right[state == each].astype(float)) for each in (*STATES, NO_DOOR)]
+        rows.append(
+            (
+                method,
+                str(len(state)),
+                *(number(share) for share in shares),
+                number(float(np.mean(shares))),
+                number(float(right.mean())),
+            )
+        )
+    return Table(
+        "Four answers: a state, or no door",
+        ("network", "samples", *(f"right of {each}" for each in (*STATES, NO_DOOR)), "mean", "of all"),
+        tuple(rows),
+        "A state is right if it is, and if a door is likelier than none.",
     )
 
 

@@ -10,7 +10,7 @@ from doorstate.dataset.store import PreparedDataset
 from doorstate.evaluation.calibration import calibration_table
 from doorstate.evaluation.error_kinds import error_kinds_table
 from doorstate.evaluation.factors import factors_table, kinds_table
-from doorstate.evaluation.head_tables import answers_table, parts_table, presence_table
+from doorstate.evaluation.head_tables import answers_table, four_answers_table, parts_table, presence_table
 from doorstate.evaluation.metrics import confusion_matrix, scores
 from doorstate.evaluation.results import ComparisonResults
 from doorstate.evaluation.rule_tables import angle_table, open_table, reasons_table
@@ -66,6 +66,7 @@ def build_tables(results: ComparisonResults, dataset: PreparedDataset) -> dict[s
                 "factors": factors_table(results, dataset),
                 "kinds": kinds_table(results, dataset),
                 "head_answers": answers_table(results, dataset),
+                "four_answers": four_answers_table(results, dataset),
                 "presence": presence_table(results, dataset),
                 "parts": parts_table(results),
             }

@@ -29,7 +29,7 @@ def in_metres(answers: Mapping[str, NDArray[np.float32]], centroids: Points) -> 
     if "door" in found:
         columns["p_door"] = found["door"][:, 0]
     if "angle" in found:
-        columns["opening_angle_deg"] = np.degrees(found["angle"][:, 0])
+        columns["opening_angle_deg"] = _possible(np.degrees(found["angle"][:, 0]))
     if "hinge" in found:
         columns["p_hinge_left"] = found["hinge"][:, 0]
     if "frame" in found:
@@ -41,6 +41,12 @@ def in_metres(answers: Mapping[str, NDArray[np.float32]], centroids: Points) -> 
         widths = found["widths"] * SCALE_M
         columns |= {"opening_width_m": widths[:, 0], "passable_width_m": widths[:, 1]}
     return columns
+
+
+def _possible(angle_deg: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The nearest angle that a door can have, 0 to 180 degrees: a head says a direction, which can be any."""
+    beyond = np.where(angle_deg < -90, 180.0, 0.0)
+    return np.where(angle_deg < 0, beyond, angle_deg)
 
 
 def write_answers(path: Path, samples: Sequence[str], columns: Columns) -> None:
