@@ -4,23 +4,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from pathlib import Path
-from typing import NamedTuple
 
-import numpy as np
 from duels import FEW_PIXELS, NEARBY_M, cases_table
 from published import rows_of
 from results_page import NAMES, render, whole_folds
+from worlds_targets import AT_4096, CLUTTER, MIXTURE, Published, targets_table
 
-from doorstate.dataset.store import PreparedDataset, open_dataset
-from doorstate.evaluation.calibration import calibrate, reliability
+from doorstate.dataset.store import open_dataset
 from doorstate.evaluation.factors import ANGLE, OCCLUSION, factor_bins
-from doorstate.evaluation.head_tables import answer_errors
-from doorstate.evaluation.metrics import confusion_matrix, scores
-from doorstate.evaluation.results import ComparisonResults, load_results
-from doorstate.evaluation.stratum_tables import is_undecidable
-from doorstate.evaluation.stratum_tables import rows_of as manifest_of
+from doorstate.evaluation.results import load_results
 from doorstate.evaluation.table import Table, number
 from doorstate.networks import list_networks
 
@@ -38,101 +31,8 @@ CASES: dict[str, Callable[[Mapping[str, str]], bool]] = {
     f"fewer than {FEW_MEASURED} measured pixels": lambda row: float(row["measured_px"]) < FEW_MEASURED,
     f"from nearer than {NEARBY_M:.0f} m": lambda row: float(row["distance_m"]) < NEARBY_M,
 }
-MIXTURE = "mixture-1024"  # the comparison of the page
 STUDIES = ("mixture-points", "transfer", "augmentation")  # shown below, once they are published
-ANGLES, CLUTTER = (f"transfer/mixture/{name}" for name in ("angles", "cluttered"))
-
-
-class Published(NamedTuple):
-    """A published comparison, and the rows of what it tested."""
-
-    results: ComparisonResults
-    dataset: PreparedDataset
-
-
-class Target(NamedTuple):
-    """Something that was asked for, and how well a network does at it."""
-
-    words: str
-    bound: float
-    more_is_better: bool
-    digits: int
-    found: Callable[[ComparisonResults, PreparedDataset, str], float]
-    where: str = MIXTURE  # published comparison that tells
-
-    def reached(self, value: float) -> bool:
-        """Whether a figure is good enough; one that nobody knows is not."""
-        return bool(value >= self.bound if self.more_is_better else value <= self.bound)
-
-
-def _noisy_macro_f1(
-    results: ComparisonResults, dataset: PreparedDataset, network: str, undecidable: bool = True
-) -> float:
-    pooled = results.pooled(network)
-    chosen = np.array(
-        [
-            row["sensor"] == "xtion"
-            and row["pose_id"].startswith("varied-")
-            and (undecidable or not is_undecidable(row))
-            for row in manifest_of(dataset, pooled)
-        ]
-    )
-    return float(scores(confusion_matrix(pooled.true[chosen], pooled.predicted[chosen])).macro.f1)
-
-
-def _points_lost(results: ComparisonResults, dataset: PreparedDataset, network: str) -> float:
-    """By clutter that hides up to a quarter of a door, against none of it, in points of accuracy."""
-    pooled = results.pooled(network)
-    rows = manifest_of(dataset, pooled)
-    bins = np.array([row["occluded_bin"] for row in rows])
-    free, hidden = (pooled.right[bins == name] for name in ("0", "0-25"))
-    return 100 * float(free.mean() - hidden.mean())
-
-
-def _calibration_error(results: ComparisonResults, dataset: PreparedDataset, network: str) -> float:
-    found = calibrate(results, network)
-    return float("nan") if found is None else 100 * reliability(found.true, found.scaled).error
-
-
-def _head(name: str, factor: float = 1.0) -> Callable[[ComparisonResults, PreparedDataset, str], float]:
-    def found(results: ComparisonResults, dataset: PreparedDataset, network: str) -> float:
-        given = results.answers(network)
-        return float("nan") if given is None else factor * answer_errors(given, dataset)[name]
-
-    return found
-
-
-TARGETS = (
-    Target("macro F1 of three states, `varied` as an Xtion sees it", 0.97, True, 4, _noisy_macro_f1),
-    Target(
-        "the same without frames that look alike in another state",
-        0.97,
-        True,
-        4,
-        partial(_noisy_macro_f1, undecidable=False),
-    ),
-    Target("AUROC of *there is a door*", 0.99, True, 4, _head("door, AUROC")),
-    Target("expected calibration error, %", 3, False, 1, _calibration_error),
-    Target(
-        "opening angle of semi-open doors, mean error, °",
-        5,
-        False,
-        1,
-        _head("opening angle, semi-open: mean error, °"),
-    ),
-    Target("hinge side, % right", 98, True, 1, _head("hinge side", 100)),
-    Target("of doors that are not closed", 98, True, 1, _head("of doors not closed", 100)),
-    Target("frame position, median error, cm", 8, False, 1, _head("frame position: median error, m", 100)),
-    Target("frame yaw, median error, °", 4, False, 1, _head("yaw: median error, °")),
-    Target(
-        "points of accuracy lost where up to a quarter of the door is hidden",
-        3,
-        False,
-        1,
-        _points_lost,
-        CLUTTER,
-    ),
-)
+ANGLES = "transfer/mixture/angles"
 
 
 def write_worlds_page(results_folder: Path, reports_folder: Path, page: Path) -> None:
@@ -148,7 +48,7 @@ def write_worlds_page(results_folder: Path, reports_folder: Path, page: Path) ->
         return
     published = {
         where: _open(results_folder / where, results_folder)
-        for where in (MIXTURE, ANGLES, CLUTTER)
+        for where in (MIXTURE, ANGLES, CLUTTER, AT_4096)
         if (results_folder / where).is_dir()
     }
     results, dataset = published[MIXTURE]
@@ -218,33 +118,3 @@ def _lost(cases: Table, rules: Sequence[str]) -> list[str]:
         and max(float(row[method]) for method in methods if method in rules)
         > max(float(row[method]) for method in methods if method not in rules)
     ]
-
-
-def targets_table(published: Mapping[str, Published], networks: Sequence[str]) -> Table:
-    """What was asked for, and what every network reaches; what is not published yet nobody knows.
-
-    Args:
-        published: comparisons by where they lie in the folder of everything published.
-        networks: in the order of columns.
-    """
-    rows = []
-    for target in TARGETS:
-        found = dict.fromkeys(networks, float("nan"))
-        if target.where in published:
-            results, dataset = published[target.where]
-            found |= {
-                network: target.found(results, dataset, network)
-                for network in results.networks
-                if network in networks
-            }
-        good = [NAMES[network] for network in networks if target.reached(found[network])]
-        rows.append(
-            (
-                target.words,
-                f"{'≥' if target.more_is_better else '≤'} {target.bound:g}",
-                *(number(found[network], target.digits) for network in networks),
-                "all" if len(good) == len(networks) else ", ".join(good) or "none",
-            )
-        )
-    columns = ("", "asked for", *(NAMES[network] for network in networks), "reached by")
-    return Table("What was asked for, and what is reached", columns, tuple(rows))
