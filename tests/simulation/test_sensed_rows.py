@@ -28,7 +28,7 @@ def simulated(sensor: str) -> list[Row]:
     return [*simulate_pose(OGUROB, 0, 700, sensor)[0], *simulate_scene(CLUTTERED, 0, 1, sensor)[0]]
 
 
-@pytest.mark.parametrize("sensor", ["gaussian:0.02", "xtion", "d435", "deepdoors2"])
+@pytest.mark.parametrize("sensor", ["gaussian:0.02", "xtion", "kinect", "d435", "deepdoors2"])
 def test_rows_read_back_from_csv_replay_bit_for_bit(tmp_path: Path, sensor: str) -> None:
     rows = simulated(sensor)
     write_csv(tmp_path / "manifest.csv", [flatten(row) for row in rows])

@@ -17,9 +17,9 @@ from doorstate.simulation.settings import SceneSettings, SimulationSettings, set
 CAMERA = DepthCamera(width=40, height=30)
 
 
-def settings_of(name: PresetName, scenes: int, seed: int = 3) -> SceneSettings:
+def settings_of(name: PresetName, scenes: int, seed: int = 3, sensor: str = "none") -> SceneSettings:
     preset = ScenePreset(name=name, camera=CAMERA)
-    return SceneSettings(preset=preset, seed=seed, scenes=scenes, raw=("depth",))
+    return SceneSettings(preset=preset, seed=seed, scenes=scenes, sensor=sensor, raw=("depth",))
 
 
 def contents(folder: Path) -> dict[str, bytes]:
@@ -30,9 +30,18 @@ def contents(folder: Path) -> dict[str, bytes]:
     }
 
 
-@pytest.mark.parametrize("name", ["varied", "cluttered", "no-door"])
-def test_shards_in_any_order_join_to_the_same_bytes(tmp_path: Path, name: PresetName) -> None:
-    settings = settings_of(name, 20)
+@pytest.mark.parametrize(
+    ("name", "sensor"),
+    [
+        ("varied", "none"),
+        ("varied", "gaussian:0.02"),
+        ("cluttered", "none"),
+        ("no-door", "none"),
+        ("varied-angles", "gaussian:0.02"),
+    ],
+)
+def test_shards_in_any_order_join_to_the_same_bytes(tmp_path: Path, name: PresetName, sensor: str) -> None:
+    settings = settings_of(name, 20, sensor=sensor)
     whole = simulate_dataset(tmp_path / "whole", settings, 1)
     for shard in ("3/3", "1/3", "3/3"):
         simulate_shard(tmp_path / "shared", settings, Shard.parse(shard), 1)
@@ -45,6 +54,17 @@ def test_shards_in_any_order_join_to_the_same_bytes(tmp_path: Path, name: Preset
     steps: list[tuple[int, int]] = []
     assert simulate_dataset(tmp_path / "shared", settings, 1, lambda *step: steps.append(step)) == whole
     assert steps == [(2, 3), (3, 3)]
+    assert contents(tmp_path / "shared") == contents(tmp_path / "whole")
+
+
+@pytest.mark.parametrize("sensor", ["xtion", "d435"])
+def test_a_cameras_noise_is_the_same_whatever_the_sharding_and_whoever_works(
+    tmp_path: Path, sensor: str
+) -> None:
+    settings = settings_of("varied", 9, sensor=sensor)
+    whole = simulate_dataset(tmp_path / "whole", settings, 1)
+    simulate_shard(tmp_path / "shared", settings, Shard.parse("2/2"), 1)
+    assert simulate_dataset(tmp_path / "shared", settings, 2) == whole
     assert contents(tmp_path / "shared") == contents(tmp_path / "whole")
 
 

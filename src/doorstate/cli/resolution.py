@@ -18,6 +18,9 @@ def resolution(
 ) -> None:
     """Accuracy and time of finished weights on fewer points; stopped at any moment, it goes on where it was.
 
+    A study file is TOML: dataset, start_from (a finished comparison), points (a list); protocol, networks, folds, seed
+    and heads as of that comparison; fine_tuning, fields of a recipe, if weights shall be trained a little too.
+
     \b
     Examples:
       doorstate resolution experiments/resolution.toml

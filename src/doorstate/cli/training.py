@@ -36,7 +36,7 @@ def train(
     Examples:
       doorstate train pointnet2 --data data/ogurob-4096 --points 1024 --epochs 12 --out runs/first
       doorstate train dgcnn --data data/ogurob-4096 --recipe authors --set batch_size=16 --out runs/dgcnn
-      doorstate train pointnet2 --data data/varied --protocol by-scene --heads door,angle,frame --out runs/heads
+      doorstate train pointnet2 --data data/varied-4096 --protocol by-scene --heads door,angle,frame --out runs/heads
     """
     from doorstate.console import live_runs
     from doorstate.console import out as stdout

@@ -16,8 +16,8 @@ def transfer(
 ) -> None:
     """Test finished weights on data that none of them has seen; stopped at any moment, it goes on where it was.
 
-    A study file names comparisons, whose fold 0 is tested, and prepared data sets. `doorstate report
-    FOLDER/TRAINED/TESTED` tells more of one pair.
+    A study file is TOML: networks, num_points, a table [trained] of comparisons, whose fold 0 is tested, and a table
+    [tested] of prepared data sets. `doorstate report FOLDER/TRAINED/TESTED` tells more of one pair.
 
     \b
     Examples:

@@ -29,6 +29,8 @@ def export_sdf(
     from doorstate.simulation.run import MANIFEST
     from doorstate.simulation.sdf import sdf_world
 
+    if not (source / MANIFEST).is_file():
+        raise ConfigError(f"{source}: is no simulated folder: it has no {MANIFEST}")
     rows = {row.get("sample_id", ""): row for row in read_csv(source / MANIFEST)}
     for sample in samples:
         if sample not in rows:
