@@ -197,6 +197,18 @@ def test_another_comparison_in_the_same_folder_is_refused(
         prepare_comparison(experiment(small_dataset, seed=1), tmp_path / "c")
 
 
+def test_scenes_without_a_door_are_refused_before_anything_is_written(
+    scene_dataset: PreparedDataset, tmp_path: Path
+) -> None:
+    experiment = Experiment(
+        name="x", dataset=str(scene_dataset.folder), protocol="by-scene", folds=1, networks=("pointnet",)
+    )
+    with pytest.raises(ConfigError, match=r"12 samples show no door, .* add the head 'door'"):
+        prepare_comparison(experiment, tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+    prepare_comparison(experiment.model_copy(update={"heads": ("door",)}), tmp_path / "run")
+
+
 def test_runs_go_fold_by_fold(small_dataset: PreparedDataset, tmp_path: Path) -> None:
     both = experiment(small_dataset, networks=("pointnet", "dgcnn"))
     assert [(run.network, run.fold) for run in runs_of(both, tmp_path)] == [

@@ -33,7 +33,10 @@ _PAGE = "frames.html"
 
 def evaluate(
     folder: Annotated[
-        Path, typer.Argument(help="Folder with an index.csv, or with sub-folders named after states, or of a --layout.")
+        Path,
+        typer.Argument(
+            help="Folder with an index.csv, or with sub-folders named after states, or of a --layout."
+        ),
     ],
     network: Annotated[
         list[str] | None, typer.Option(help="Network whose packaged weights to ask; repeatable.")

@@ -31,6 +31,18 @@ class Batch(NamedTuple):
     targets: Mapping[str, Tensor] = MappingProxyType({})
 
 
+def check_states(dataset: PreparedDataset, sample_ids: Sequence[str], heads: Sequence[str]) -> None:
+    """Raise ConfigError if samples show no door and there is no head that could say so."""
+    if DOOR in heads:
+        return
+    without = [sample for sample in sample_ids if dataset.labels[dataset.index_of(sample)] >= len(DoorState)]
+    if without:
+        raise ConfigError(
+            f"{dataset.folder}: {len(without)} samples show no door, such as {without[0]}; "
+            f"a network of three states learns nothing from them: leave them out, or add the head '{DOOR}'"
+        )
+
+
 class CloudLoader:
     """The first `num_points` of chosen samples, normalised once and kept in memory."""
 
@@ -67,13 +79,8 @@ class CloudLoader:
         points = dataset.clouds[indices, :num_points]
         self.centroids = centroids(points)  # (M, 3) metres
         self._points = normalize(points)
+        check_states(dataset, sample_ids, heads)
         self._labels = np.where(dataset.labels[indices] < len(DoorState), dataset.labels[indices], NO_STATE)
-        without = np.flatnonzero(self._labels == NO_STATE)
-        if len(without) and DOOR not in heads:
-            raise ConfigError(
-                f"{dataset.folder}: {len(without)} samples show no door, such as {sample_ids[without[0]]}; "
-                f"a network of three states learns nothing from them: leave them out, or add the head '{DOOR}'"
-            )
         rows = [dataset.rows[index] for index in indices]
         wanted = door_targets(rows, self.centroids) if heads else {}
         self._targets = {name: values for name, values in wanted.items() if name in heads}

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple, TypeVar
 from pydantic import Field, ValidationError
 
 from doorstate.clouds.preparation import NUM_POINTS
+from doorstate.dataset.loader import check_states
 from doorstate.dataset.splits import (
     NUM_FOLDS,
     ONE_FOLD,
@@ -212,7 +213,11 @@ def prepare_comparison(experiment: Experiment, folder: Path) -> None:
     dataset = open_dataset(Path(experiment.dataset))
     splits_path = folder / "splits.csv"
     if not splits_path.is_file():
-        write_splits(splits_path, draw_splits(dataset.rows, experiment.protocol, experiment.seed))
+        splits = draw_splits(dataset.rows, experiment.protocol, experiment.seed)
+        if experiment.networks:
+            used = [sample for sample, role in splits[0].items() if role != "unused"]
+            check_states(dataset, used, experiment.heads)
+        write_splits(splits_path, splits)
     if experiment.start_from is not None:
         before = Path(experiment.start_from)
         earlier = read_comparison(before)
