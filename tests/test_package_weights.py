@@ -149,9 +149,11 @@ def test_weights_that_were_tested_say_how_well_and_when_they_are_unsure(
     told = Predictor.load(package / "some-pointnet.safetensors", gate=None)(scene_dataset.raw_cloud(0))
     assert told.opening_angle_deg is not None
 
-    longer = {"name": "longer", "start_from": str(runs / "mixture"), "recipe_changes": RECIPE}
+    weighed = RECIPE | {"loss_weights": {"state": 2.0}}
+    longer = {"name": "longer", "start_from": str(runs / "mixture"), "recipe_changes": weighed}
     compare(Experiment.model_validate(common | longer), runs / "longer")
     publish(runs / "longer", results / "longer")
     tool.main(str(runs / "longer"), "longer-")
     text = (package / "longer-pointnet.md").read_text(encoding="utf-8")
     assert "goes on from the weights of experiments/mixture.toml" in text
+    assert "the loss of the state counted 2 times" in text
