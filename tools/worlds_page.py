@@ -16,6 +16,7 @@ from doorstate.evaluation.factors import ANGLE, OCCLUSION, factor_bins
 from doorstate.evaluation.results import load_results
 from doorstate.evaluation.table import Table, number
 from doorstate.networks import list_networks
+from doorstate.training.run_folder import read_json
 
 FEW_MEASURED = 150_000  # of the 307,200 pixels of an image
 # Where there is little to fit a plane to, or the planes are not those of leaf and wall.
@@ -79,7 +80,14 @@ def write_worlds_page(results_folder: Path, reports_folder: Path, page: Path) ->
             title for name, title in NAMES.items() if name in list_networks() and name not in networks
         ],
         lost=_lost(cases, rules),
+        waiting=[NAMES[name] for name in networks if not _epochs(mixture, name)],
     )
+
+
+def _epochs(comparison: Path, network: str) -> int:
+    """Of training, 0 where weights that were there before are tested; at least one where nobody says."""
+    recipes = read_json(comparison / "comparison.json").get("recipe", {})
+    return int(recipes.get(network, {}).get("epochs", 1))
 
 
 def _open(comparison: Path, results_folder: Path) -> Published:
