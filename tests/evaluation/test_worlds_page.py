@@ -126,7 +126,7 @@ def test_what_was_asked_for_stands_beside_what_is_reached(
     assert "## What each augmentation is worth" not in text
     assert "(20 clouds, one fold" in text
     assert lines["all doors"] == ["24", "1.0000", "0.6667"]
-    assert "Rules that fit planes (`plane_state`;" in text
+    assert "fit planes or bins of depth to it (`plane_state`;" in text
     assert "For no kind of sample is a rule right more often" in text
 
 
