@@ -67,6 +67,27 @@ def results(folder: Path) -> tuple[str, dict[str, Any], bytes]:
     return (folder / "predictions.csv").read_text(), metrics, (folder / "weights.safetensors").read_bytes()
 
 
+def fit_and_stop(
+    epoch: int,
+    dataset: PreparedDataset,
+    roles: dict[str, Role],
+    folder: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Begin a run that somebody stops before an epoch."""
+
+    def stop(self: Any, now: int, *rest: Any) -> tuple[float, float]:
+        if now == epoch:
+            raise KeyboardInterrupt
+        return original(self, now, *rest)
+
+    original = fit_module._Trainer._epoch
+    with monkeypatch.context() as patch:
+        patch.setattr(fit_module._Trainer, "_epoch", stop)
+        with pytest.raises(KeyboardInterrupt):
+            fit(config(), dataset, roles, folder)
+
+
 def test_a_run_leaves_everything_needed_to_judge_it(finished: Path, roles: dict[str, Role]) -> None:
     assert sorted(path.name for path in finished.iterdir()) == [
         "config.json",
@@ -125,16 +146,7 @@ def test_a_stopped_run_ends_as_if_it_had_not_been(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def stop(self: Any, epoch: int, *rest: Any) -> tuple[float, float]:
-        if epoch == stop_after:
-            raise KeyboardInterrupt
-        return original(self, epoch, *rest)
-
-    original = fit_module._Trainer._epoch
-    with monkeypatch.context() as patch:
-        patch.setattr(fit_module._Trainer, "_epoch", stop)
-        with pytest.raises(KeyboardInterrupt):
-            fit(config(), small_dataset, roles, tmp_path / "run")
+    fit_and_stop(stop_after, small_dataset, roles, tmp_path / "run", monkeypatch)
     assert (tmp_path / "run" / "checkpoint.pt").is_file()
     torch.manual_seed(99)  # whatever happened to the global generator in between
     fit(config(), small_dataset, roles, tmp_path / "run")
@@ -241,16 +253,7 @@ def test_the_checkpoint_of_a_version_with_one_optimizer_is_continued(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def stop(self: Any, epoch: int, *rest: Any) -> tuple[float, float]:
-        if epoch == 2:
-            raise KeyboardInterrupt
-        return original(self, epoch, *rest)
-
-    original = fit_module._Trainer._epoch
-    with monkeypatch.context() as patch:
-        patch.setattr(fit_module._Trainer, "_epoch", stop)
-        with pytest.raises(KeyboardInterrupt):
-            fit(config(), small_dataset, roles, tmp_path / "run")
+    fit_and_stop(2, small_dataset, roles, tmp_path / "run", monkeypatch)
     checkpoint = tmp_path / "run" / "checkpoint.pt"
     state = torch.load(checkpoint, weights_only=True)
     (state["optimizer"],) = state.pop("optimizers")

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 from sklearn.metrics import roc_auc_score
@@ -88,13 +89,18 @@ def answer_errors(given: Answers, dataset: PreparedDataset) -> dict[str, float]:
     return dict(zip(_ERRORS, found, strict=True))
 
 
+def _of_doors(results: ComparisonResults) -> Iterator[tuple[str, Answers]]:
+    """Networks that say whether there is a door, and what they say."""
+    for method in results.networks:
+        given = results.answers(method)
+        if given is not None and "p_door" in given.columns:
+            yield method, given
+
+
 def presence_table(results: ComparisonResults, dataset: PreparedDataset) -> Table:
     """How often a network says that there is a door, by what is there."""
     rows = []
-    for method in results.networks:
-        given = results.answers(method)
-        if given is None or "p_door" not in given.columns:
-            continue
+    for method, given in _of_doors(results):
         manifest = rows_of(dataset, given)
         kinds = np.array([row.get("door_kind") or row.get("scene_kind", "") for row in manifest])
         doors = np.array([row["state"] != NO_DOOR for row in manifest])
@@ -115,10 +121,7 @@ def presence_table(results: ComparisonResults, dataset: PreparedDataset) -> Tabl
 def four_answers_table(results: ComparisonResults, dataset: PreparedDataset) -> Table:
     """A state or *no door*, as a predictor answers: of what seems to be no door no state is said."""
     rows = []
-    for method in results.networks:
-        given = results.answers(method)
-        if given is None or "p_door" not in given.columns:
-            continue
+    for method, given in _of_doors(results):
         state = np.array([row["state"] for row in rows_of(dataset, given)])
         right_state = results.pooled(method).right_by_sample
         door = given.columns["p_door"] >= SURE
