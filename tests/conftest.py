@@ -59,12 +59,23 @@ def small_dataset(simulated_folder: Path, tmp_path_factory: pytest.TempPathFacto
 def scene_dataset(tmp_path_factory: pytest.TempPathFactory) -> PreparedDataset:
     """Eight varied doors in three states and twelve scenes without one, 160 points each, seen by a small camera."""
     folder = tmp_path_factory.mktemp("scenes")
-    camera = DepthCamera(width=160, height=120)
-    for name, scenes in (("varied", 8), ("no-door", 12)):
-        preset = SCENE_PRESETS[name].model_copy(update={"camera": camera})
-        simulate_dataset(folder / name, SceneSettings(preset=preset, seed=4, scenes=scenes), workers=1)
-        prepare_dataset(Preparation(folder / name, SMALL_POINTS), folder / f"{name}-160", workers=1)
-    return join_datasets([folder / "varied-160", folder / "no-door-160"], folder / "joined")
+    parts = [_scenes(folder, preset, 4, scenes) for preset, scenes in (("varied", 8), ("no-door", 12))]
+    return join_datasets([part.folder for part in parts], folder / "joined")
+
+
+@pytest.fixture(scope="session")
+def more_dataset(tmp_path_factory: pytest.TempPathFactory) -> PreparedDataset:
+    """Four varied doors of another seed in three states, 160 points each."""
+    return _scenes(tmp_path_factory.mktemp("more"), "varied", 5, 4)
+
+
+def _scenes(folder: Path, preset: str, seed: int, scenes: int) -> PreparedDataset:
+    """Scenes seen by a small camera, simulated and prepared below `folder`."""
+    small = SCENE_PRESETS[preset].model_copy(update={"camera": DepthCamera(width=160, height=120)})
+    simulate_dataset(folder / preset, SceneSettings(preset=small, seed=seed, scenes=scenes), workers=1)
+    return prepare_dataset(
+        Preparation(folder / preset, SMALL_POINTS), folder / f"{preset}-160", workers=1
+    ).dataset
 
 
 @pytest.fixture(scope="session")

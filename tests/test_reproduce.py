@@ -7,6 +7,7 @@ import importlib.util
 import json
 import sys
 import tomllib
+from contextlib import nullcontext
 from pathlib import Path
 from types import ModuleType
 
@@ -118,18 +119,38 @@ def test_an_experiment_comes_after_its_data_and_what_it_begins_with(
     path: Path, reproduce: ModuleType, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     called: list[str] = []
-    monkeypatch.setattr(reproduce, "doorstate", called.append)
+    monkeypatch.setattr(reproduce, "doorstate", lambda command, fine=(0,): called.append(command))
     monkeypatch.setattr(reproduce, "commands", lambda folder: [f"make {folder.name}"])
     reproduce.run(path.stem)
     made = [line.removeprefix("make ") for line in called if line.startswith("make ")]
     asked = tomllib.loads(path.read_text())
-    assert {Path(each).name for each in asked.get("tested", {}).values() or [asked["dataset"]]} <= set(made)
+    needed = [*(asked.get("tested", {}).values() or [asked["dataset"]]), *asked.get("more_to_learn", [])]
+    assert {Path(each).name for each in needed} <= set(made)
     (own,) = (number for number, line in enumerate(called) if f"/{path.name}" in line)
     for before in asked.get("trained", {}).values() or filter(None, [asked.get("start_from")]):
         (number,) = (
             n for n, line in enumerate(called) if f"compare experiments/{Path(before).name}.toml" in line
         )
         assert number < own
+
+
+@pytest.mark.parametrize(("exit_code", "goes_on"), [(0, True), (1, True), (2, False)])
+def test_a_data_set_of_which_some_clouds_were_left_out_is_gone_on_with(
+    exit_code: int, goes_on: bool, reproduce: ModuleType, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    import doorstate_command
+
+    program = tmp_path / "doorstate"
+    program.write_text(
+        f'#!/bin/sh\necho "$1" >> {tmp_path}/called\ntest "$1" != simulate || exit {exit_code}\n'
+    )
+    program.chmod(0o755)
+    monkeypatch.setattr(doorstate_command.sys, "executable", str(tmp_path / "python"))
+    monkeypatch.setattr(reproduce, "commands", lambda folder: ["simulate"])
+    with nullcontext() if goes_on else pytest.raises(SystemExit):
+        reproduce.run("by-pose")
+    called = (tmp_path / "called").read_text().split()
+    assert called == (["simulate", "compare", "report"] if goes_on else ["simulate"])
 
 
 def test_data_sets_are_made_of_what_the_command_line_knows(reproduce: ModuleType, tmp_path: Path) -> None:
@@ -147,6 +168,11 @@ def test_data_sets_are_made_of_what_the_command_line_knows(reproduce: ModuleType
         assert words[words.index("--prepared") + 1] == f"{words[words.index('--out') + 1]}-4096"
         seeds.setdefault(seed, set()).add("test" if name.startswith("test-") else "train")
     assert all(len(uses) == 1 for uses in seeds.values()), "no scene is trained and tested on"
+    seeds_of = {
+        mixture: {data_sets.SIMULATED[part].split("--seed ")[1].split()[0] for part in parts}
+        for mixture, parts in data_sets.JOINED.items()
+    }
+    assert not seeds_of["mixture"] & seeds_of["more-mixture"], "what is learned besides is tested nowhere"
     *parts, join = data_sets.commands(tmp_path / "mixture-4096")
     made = [line.split()[line.split().index("--prepared") + 1] for line in parts]
     assert made == join.split()[1:-2]

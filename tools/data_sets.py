@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The data sets of the experiments, by name, and the commands that make them; `data/NAME-4096` is prepared.
+"""The data sets of the experiments, by name, and the commands that make them; `data/NAME-POINTS` is prepared.
 
 One seed is one set of scenes: data sets of different sensors that share it show the same doors. Whatever is mixed has a
 seed of its own.
@@ -24,6 +24,17 @@ SIMULATED = {
     "no-door-deepdoors2": "--preset no-door --scenes 300 --seed 18 --sensor deepdoors2",
     "varied-clean": "--preset varied --scenes 400 --seed 19",
     "no-door-clean": "--preset no-door --scenes 200 --seed 20",
+    # To learn besides: twice as much again of the same.
+    "more-varied-xtion": "--preset varied --scenes 2600 --seed 41 --sensor xtion",
+    "more-varied-d435": "--preset varied --scenes 1300 --seed 42 --sensor d435",
+    "more-varied-deepdoors2": "--preset varied --scenes 500 --seed 43 --sensor deepdoors2",
+    "more-cluttered-kinect": "--preset cluttered --scenes 1400 --seed 44 --sensor kinect",
+    "more-no-door-xtion": "--preset no-door --scenes 900 --seed 45 --sensor xtion",
+    "more-no-door-d435": "--preset no-door --scenes 600 --seed 46 --sensor d435",
+    "more-no-door-kinect": "--preset no-door --scenes 600 --seed 47 --sensor kinect",
+    "more-no-door-deepdoors2": "--preset no-door --scenes 250 --seed 48 --sensor deepdoors2",
+    "more-varied-clean": "--preset varied --scenes 300 --seed 49",
+    "more-no-door-clean": "--preset no-door --scenes 100 --seed 50",
     # To test on: the same doors, whatever measures them.
     **{
         f"test-{name}": f"--preset varied --scenes 100 --seed 21 --sensor {sensor}"
@@ -36,38 +47,39 @@ SIMULATED = {
     "test-angles": "--preset varied-angles --scenes 200 --seed 22 --sensor xtion",
     "test-cluttered": "--preset cluttered --scenes 300 --seed 23 --sensor xtion",
 }
-JOINED = {
-    # Every camera sees doors and walls without one: what a camera looks like must not tell them apart.
-    "mixture": (
-        "varied-xtion",
-        "varied-d435",
-        "varied-deepdoors2",
-        "cluttered-kinect",
-        "no-door-xtion",
-        "no-door-d435",
-        "no-door-kinect",
-        "no-door-deepdoors2",
-        "varied-clean",
-        "no-door-clean",
-    ),
-}
+# Every camera sees doors and walls without one: what a camera looks like must not tell them apart.
+_MIXED = (
+    "varied-xtion",
+    "varied-d435",
+    "varied-deepdoors2",
+    "cluttered-kinect",
+    "no-door-xtion",
+    "no-door-d435",
+    "no-door-kinect",
+    "no-door-deepdoors2",
+    "varied-clean",
+    "no-door-clean",
+)
+JOINED = {"mixture": _MIXED, "more-mixture": tuple(f"more-{part}" for part in _MIXED)}
 # The D435 sees 10 m, all others 5 or less. Doors are within 3.5 m, and farthest-point sampling spends its points on
 # space, which behind an open door is mostly the end of the next room. Thinned as a predictor thins.
 BEYOND = "--thin --max-depth-m 5"
 
 
 def commands(prepared: Path) -> Iterator[str]:
-    """What `doorstate` has to be called with, in this order, for `data/NAME-4096`; steps that are done cost nothing.
+    """What `doorstate` has to be called with, in this order, for `data/NAME-POINTS`; steps that are done cost nothing.
 
     Raises:
         KeyError: no such data set.
     """
-    name = prepared.name.removesuffix("-4096")
+    name, _, points = prepared.name.rpartition("-")
     if name not in JOINED:
         options = "" if name.endswith("ogurob") else f" {BEYOND}"
-        yield f"simulate {SIMULATED[name]} --out data/{name} --prepared data/{name}-4096{options}"
+        yield (
+            f"simulate {SIMULATED[name]} --out data/{name} --prepared data/{name}-{points} --points {points}{options}"
+        )
     elif not (prepared / "dataset.json").is_file():
-        parts = [prepared.with_name(f"{part}-4096") for part in JOINED[name]]
+        parts = [prepared.with_name(f"{part}-{points}") for part in JOINED[name]]
         for part in parts:
             yield from commands(part)
-        yield f"join {' '.join(f'data/{part.name}' for part in parts)} --out data/{name}-4096"
+        yield f"join {' '.join(f'data/{part.name}' for part in parts)} --out data/{name}-{points}"

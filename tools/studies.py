@@ -44,7 +44,8 @@ class Asked(NamedTuple):
     @property
     def datasets(self) -> list[Path]:
         """Prepared data sets that it needs."""
-        return [Path(each) for each in self.content.get("tested", {}).values() or [self.content["dataset"]]]
+        tested = self.content.get("tested", {}).values() or [self.content["dataset"]]
+        return [Path(each) for each in (*tested, *self.content.get("more_to_learn", ()))]
 
 
 def read_asked(path: Path) -> Asked:

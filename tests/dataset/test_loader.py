@@ -138,3 +138,25 @@ def test_neighbours_are_searched_once_per_cloud_and_belong_to_it(dataset: Prepar
 
 def test_without_a_search_there_are_no_neighbours(loader: CloudLoader) -> None:
     assert {batch.neighbourhoods for batch in loader.in_order(5)} == {None}
+
+
+def test_more_data_sets_follow_whole_and_every_sample_keeps_what_is_its_own(
+    scene_dataset: PreparedDataset, more_dataset: PreparedDataset
+) -> None:
+    heads = ("door", "angle", "parts")
+    some = scene_dataset.sample_ids[5:9]
+    loader = CloudLoader(scene_dataset, some, 128, heads=heads, more=[more_dataset])
+    assert loader.sample_ids == [*some, *more_dataset.sample_ids]
+    (joined,) = loader.in_order(len(loader))
+    apart = [
+        next(CloudLoader(dataset, samples, 128, heads=heads).in_order(len(samples)))
+        for dataset, samples in ((scene_dataset, some), (more_dataset, more_dataset.sample_ids))
+    ]
+    assert torch.equal(joined.points, torch.cat([each.points for each in apart]))
+    assert torch.equal(joined.labels, torch.cat([each.labels for each in apart]))
+    for name, values in joined.targets.items():
+        expected = torch.cat([each.targets[name] for each in apart])
+        torch.testing.assert_close(values, expected, rtol=0, atol=0, equal_nan=True)
+    assert len(loader.centroids) == len(loader)
+    with pytest.raises(ConfigError, match="holds 160 points a cloud, not 161"):
+        CloudLoader(more_dataset, [], 161)

@@ -19,7 +19,7 @@ import pytest
 
 from doorstate.dataset.splits import read_splits
 from doorstate.dataset.store import PreparedDataset
-from doorstate.errors import ConfigError, RunError
+from doorstate.errors import ConfigError, DatasetError, RunError
 from doorstate.files import read_csv
 from doorstate.training.comparison import Experiment, compare, load_experiment, prepare_comparison, runs_of
 from doorstate.training.resolution import load_study
@@ -269,3 +269,33 @@ def test_killed_and_restarted_it_ends_the_same(
     compare(settings, tmp_path / "undisturbed")
     assert outcome(tmp_path / "killed") == outcome(tmp_path / "undisturbed")
     assert len(outcome(tmp_path / "killed")) == 4
+
+
+def test_more_is_learned_in_every_fold_and_never_tested(
+    small_dataset: PreparedDataset, more_dataset: PreparedDataset, tmp_path: Path
+) -> None:
+    plain = experiment(small_dataset, recipe_changes=CHANGES | {"epochs": 1})
+    more = plain.model_copy(update={"more_to_learn": (str(more_dataset.folder),)})
+    alone, both = (compare(each, tmp_path / name) for name, each in (("alone", plain), ("both", more)))
+    for one, other in zip(alone, both, strict=True):
+        assert other["train_samples"] == one["train_samples"] + len(more_dataset)
+        assert (other["val_samples"], other["test_samples"]) == (one["val_samples"], one["test_samples"])
+    for fold in (0, 1):
+        tested = [
+            read_csv(tmp_path / name / f"runs/pointnet2/fold{fold}/predictions.csv")
+            for name in ("alone", "both")
+        ]
+        assert [row["sample_id"] for row in tested[0]] == [row["sample_id"] for row in tested[1]]
+        assert tested[0] != tested[1]
+    card = read_card(tmp_path / "both/runs/pointnet2/fold0/weights.safetensors")
+    assert card.trained_on.endswith(f"fold 0, and {len(more_dataset)} samples besides")
+
+
+def test_what_is_tested_is_not_learned_besides(small_dataset: PreparedDataset, tmp_path: Path) -> None:
+    itself = experiment(small_dataset, more_to_learn=(str(small_dataset.folder),))
+    with pytest.raises(ConfigError, match=f"shares {len(small_dataset)} samples with .*, such as p"):
+        compare(itself, tmp_path / "comparison")
+    assert not (tmp_path / "comparison").exists()
+    missing = experiment(small_dataset, more_to_learn=(str(tmp_path / "gone"),))
+    with pytest.raises(DatasetError, match="no prepared data set here"):
+        compare(missing, tmp_path / "comparison")

@@ -43,6 +43,16 @@ def check_states(dataset: PreparedDataset, sample_ids: Sequence[str], heads: Seq
         )
 
 
+class _Loaded(NamedTuple):
+    """Of M samples: (M, n, 3) normalised points, (M, 3) centroids in metres, (M,) labels, targets by head, parts."""
+
+    points: np.ndarray
+    centroids: np.ndarray
+    labels: np.ndarray
+    targets: dict[str, np.ndarray]
+    parts: np.ndarray | None  # (M, n)
+
+
 class CloudLoader:
     """The first `num_points` of chosen samples, normalised once and kept in memory."""
 
@@ -53,6 +63,7 @@ class CloudLoader:
         num_points: int,
         find_neighbours: FindNeighbours | None = None,
         heads: Sequence[str] = (),
+        more: Sequence[PreparedDataset] = (),
     ) -> None:
         """Load clouds.
 
@@ -64,27 +75,23 @@ class CloudLoader:
                 augmentations that leave its result as it is.
             heads: answers that the batches hold targets for (dataset.targets); with "door" among them samples without
                 one are allowed, and labelled `NO_STATE`.
+            more: data sets whose samples follow, all of them.
 
         Raises:
             ConfigError: more points are asked for than the data set holds, a sample shows no door, or nobody knows the
                 parts of the points.
         """
-        if num_points > dataset.num_points:
-            raise ConfigError(
-                f"{dataset.folder}: holds {dataset.num_points} points a cloud, not {num_points}"
-            )
-        indices = np.array([dataset.index_of(sample) for sample in sample_ids], dtype=np.int64)
-        self.sample_ids = list(sample_ids)
-        # A prefix of a farthest-point order is the farthest-point sample of that size.
-        points = dataset.clouds[indices, :num_points]
-        self.centroids = centroids(points)  # (M, 3) metres
-        self._points = normalize(points)
-        check_states(dataset, sample_ids, heads)
-        self._labels = np.where(dataset.labels[indices] < len(DoorState), dataset.labels[indices], NO_STATE)
-        rows = [dataset.rows[index] for index in indices]
-        wanted = door_targets(rows, self.centroids) if heads else {}
-        self._targets = {name: values for name, values in wanted.items() if name in heads}
-        self._parts = dataset.parts_of(indices, num_points) if PARTS in heads else None
+        chosen = [(dataset, list(sample_ids)), *((each, each.sample_ids) for each in more)]
+        self.sample_ids = [sample for _, samples in chosen for sample in samples]
+        loaded = [_load(source, samples, num_points, heads) for source, samples in chosen]
+        self._points = np.concatenate([each.points for each in loaded])
+        self.centroids = np.concatenate([each.centroids for each in loaded])  # (M, 3) metres
+        self._labels = np.concatenate([each.labels for each in loaded])
+        self._targets = {
+            name: np.concatenate([each.targets[name] for each in loaded]) for name in loaded[0].targets
+        }
+        known = [each.parts for each in loaded if each.parts is not None]
+        self._parts = np.concatenate(known) if known else None
         self._neighbours = (
             None if find_neighbours is None else _KnownNeighbours(find_neighbours, self._points)
         )
@@ -128,6 +135,24 @@ class CloudLoader:
         if self._parts is not None:
             targets[PARTS] = torch.from_numpy(known_parts(self._parts[chosen]))
         return Batch(torch.from_numpy(points), torch.from_numpy(self._labels[chosen]), known, targets)
+
+
+def _load(
+    dataset: PreparedDataset, sample_ids: Sequence[str], num_points: int, heads: Sequence[str]
+) -> _Loaded:
+    """Samples of one data set; arguments and errors are those of `CloudLoader`."""
+    if num_points > dataset.num_points:
+        raise ConfigError(f"{dataset.folder}: holds {dataset.num_points} points a cloud, not {num_points}")
+    indices = np.array([dataset.index_of(sample) for sample in sample_ids], dtype=np.int64)
+    # A prefix of a farthest-point order is the farthest-point sample of that size.
+    points = dataset.clouds[indices, :num_points]
+    centroids_m = centroids(points)
+    check_states(dataset, sample_ids, heads)
+    labels = np.where(dataset.labels[indices] < len(DoorState), dataset.labels[indices], NO_STATE)
+    wanted = door_targets([dataset.rows[index] for index in indices], centroids_m) if heads else {}
+    targets = {name: values for name, values in wanted.items() if name in heads}
+    parts = dataset.parts_of(indices, num_points) if PARTS in heads else None
+    return _Loaded(normalize(points), centroids_m, labels, targets, parts)
 
 
 class _KnownNeighbours:

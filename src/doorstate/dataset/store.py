@@ -102,6 +102,11 @@ class PreparedDataset:
         """(M,) class labels, doorstate.types.DoorState; 3 of a scene without a door."""
         return np.array([_LABELS.index(row["state"]) for row in self.rows], dtype=np.int64)
 
+    @property
+    def sample_ids(self) -> list[str]:
+        """Names of all samples, in order."""
+        return [row["sample_id"] for row in self.rows]
+
     @cached_property
     def _index(self) -> dict[str, int]:
         return {row["sample_id"]: index for index, row in enumerate(self.rows)}

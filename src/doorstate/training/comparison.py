@@ -57,6 +57,7 @@ class Experiment(Frozen):
     # A comparison whose weights of the same network and fold the runs go on from; networks it has not begin anew.
     start_from: str | None = None
     heads: tuple[str, ...] = ()  # answers besides the state, trained jointly
+    more_to_learn: tuple[str, ...] = ()  # data sets that are learned whole in every fold, and never tested
 
     def recipe_of(self, network: str) -> Recipe:
         """The recipe of a network, changes applied.
@@ -211,6 +212,7 @@ def prepare_comparison(experiment: Experiment, folder: Path) -> None:
     if path.is_file():
         check_same(path, settings, "a comparison")
     dataset = open_dataset(Path(experiment.dataset))
+    _check_more(experiment, dataset)
     splits_path = folder / "splits.csv"
     if not splits_path.is_file():
         splits = draw_splits(dataset.rows, experiment.protocol, experiment.seed)
@@ -226,6 +228,19 @@ def prepare_comparison(experiment: Experiment, folder: Path) -> None:
         if earlier["dataset"] == experiment.dataset:  # in another, the same name is another sample
             _check_unseen(read_splits(splits_path), before)
     write_json(path, settings)
+
+
+def _check_more(experiment: Experiment, dataset: PreparedDataset) -> None:
+    """Raise ConfigError for data sets to learn besides that share samples with the one that is tested."""
+    known = set(dataset.sample_ids)
+    for path in experiment.more_to_learn:
+        more = open_dataset(Path(path))
+        check_states(more, more.sample_ids, experiment.heads)
+        if shared := sorted(known & set(more.sample_ids)):
+            raise ConfigError(
+                f"more_to_learn: {path} shares {len(shared)} samples with {experiment.dataset}, such as {shared[0]}; "
+                "make it with another seed"
+            )
 
 
 def read_comparison(folder: Path) -> dict[str, Any]:
@@ -285,8 +300,10 @@ def train_one(
         recipe=experiment.recipe_of(network),
         start_from=_weights_before(experiment, network, fold),
         heads=experiment.heads_of(network),
+        more_to_learn=experiment.more_to_learn,
     )
-    return fit(config, dataset, splits[fold], folder)
+    more = [open_dataset(Path(each)) for each in experiment.more_to_learn]
+    return fit(config, dataset, splits[fold], folder, more)
 
 
 def _weights_before(experiment: Experiment, network: str, fold: int) -> str | None:

@@ -11,7 +11,7 @@ import logging
 import math
 import time
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -64,6 +64,7 @@ class RunConfig(Frozen):
     recipe: Recipe
     start_from: str | None = None  # a weights file to go on from
     heads: tuple[str, ...] = ()  # answers besides the state (networks.heads)
+    more_to_learn: tuple[str, ...] = ()  # data sets whose samples are all learned besides those of the fold
 
 
 class Evaluation(NamedTuple):
@@ -96,7 +97,11 @@ class Evaluation(NamedTuple):
 
 
 def fit(
-    config: RunConfig, dataset: PreparedDataset, roles: Mapping[str, Role], folder: Path
+    config: RunConfig,
+    dataset: PreparedDataset,
+    roles: Mapping[str, Role],
+    folder: Path,
+    more: Sequence[PreparedDataset] = (),
 ) -> dict[str, Any]:
     """Train, choose the epoch on the validation samples, read the test samples once.
 
@@ -106,6 +111,7 @@ def fit(
         roles: {sample_id: role} of this fold. With neither validation nor test samples the last epoch is kept and
             nothing is tested: that is how weights for use are trained on everything, once a recipe has been chosen.
         folder: of this run; finished runs are returned as they are, begun ones are continued.
+        more: clouds of `config.more_to_learn`.
 
     Returns:
         The run's metrics, as in its `metrics.json`.
@@ -131,7 +137,7 @@ def fit(
         network = _build(config)
         if config.start_from is not None:
             _start_from(network, config)
-        trainer = _Trainer(config, fabric, network, dataset, samples, run)
+        trainer = _Trainer(config, fabric, network, dataset, samples, more, run)
         trainer.train()
         metrics = trainer.test()
     run.finish(metrics)
@@ -185,10 +191,11 @@ class _Trainer:
         network: PointNetwork,
         dataset: PreparedDataset,
         samples: dict[str, list[str]],
+        more: Sequence[PreparedDataset],
         run: RunFolder,
     ) -> None:
         self.config, self.fabric, self.run = config, fabric, run
-        self.dataset, self.samples = dataset, samples
+        self.dataset, self.samples, self.more = dataset, samples, more
         self.network = network.to(fabric.device)
         self.state_loss = network.training_loss
         self.joint_losses: Callable[..., tuple[dict[str, Tensor], Tensor]] = partial(joint_losses, network)
@@ -217,8 +224,10 @@ class _Trainer:
                 search = self.network.neighbourhoods
                 kept = search if self._neighbours_keep() else None
                 loader, validation = (
-                    CloudLoader(self.dataset, self.samples[role], resolution.points, find, self.config.heads)
-                    for role, find in (("train", kept), ("val", search))
+                    CloudLoader(
+                        self.dataset, self.samples[role], resolution.points, find, self.config.heads, more
+                    )
+                    for role, find, more in (("train", kept, self.more), ("val", search, ()))
                 )
             rate, loss = self._epoch(epoch, loader, started)
             line = {
@@ -250,6 +259,7 @@ class _Trainer:
             "seconds": sum(line["seconds"] for line in self.log),
             **{f"{role}_samples": len(self.samples[role]) for role in ("train", "val", "test")},
         }
+        metrics["train_samples"] += self._num_more
         for role, path in (("val", self.run.validation), ("test", self.run.predictions)):
             samples = self.samples[role]
             if samples:
@@ -364,15 +374,20 @@ class _Trainer:
         self.best = (state["best"][0], state["best"][1])
         self.begun = _Begun(*state["begun"]) if state.get("begun") else None
 
+    @property
+    def _num_more(self) -> int:
+        return sum(len(each) for each in self.more)
+
     def _card(self) -> WeightsCard:
         config = self.config
+        besides = f", and {self._num_more} samples besides" if self.more else ""
         return WeightsCard(
             network=config.network,
             network_options=_network_options(config),
             num_points=config.num_points,
             heads=config.heads,
             max_depth_m=self.dataset.max_depth_m,
-            trained_on=f"{self.dataset.description.source}, protocol {config.protocol}, fold {config.fold}",
+            trained_on=f"{self.dataset.description.source}, protocol {config.protocol}, fold {config.fold}{besides}",
         )
 
 

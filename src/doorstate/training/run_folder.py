@@ -16,7 +16,11 @@ from doorstate.types import STATES
 
 AS_TRAINED, FINE_TUNED = "as-trained", "fine-tuned"  # parts of a resolution study: folders AS_TRAINED-POINTS
 
-_SINCE: dict[str, Any] = {"heads": [], "rules": []}  # of settings: what older folders do not know
+_SINCE: dict[str, Any] = {
+    "heads": [],
+    "rules": [],
+    "more_to_learn": [],
+}  # of settings: what older folders do not know
 
 
 class RunFolder:
