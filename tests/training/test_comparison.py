@@ -293,7 +293,7 @@ def test_more_is_learned_in_every_fold_and_never_tested(
 
 def test_what_is_tested_is_not_learned_besides(small_dataset: PreparedDataset, tmp_path: Path) -> None:
     itself = experiment(small_dataset, more_to_learn=(str(small_dataset.folder),))
-    with pytest.raises(ConfigError, match=f"shares {len(small_dataset)} samples with .*, such as p"):
+    with pytest.raises(ConfigError, match=f"{len(small_dataset)} samples of .* show scenes of .*, such as p"):
         compare(itself, tmp_path / "comparison")
     assert not (tmp_path / "comparison").exists()
     missing = experiment(small_dataset, more_to_learn=(str(tmp_path / "gone"),))

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from doorstate.dataset.join import join_datasets
 from doorstate.dataset.splits import draw_splits, read_splits, write_splits
 from doorstate.dataset.store import MANIFEST, PreparedDataset
 from doorstate.errors import ConfigError, RunError
@@ -63,6 +64,19 @@ def test_a_scene_is_known_whatever_sensor_saw_it(scene_dataset: PreparedDataset,
     assert {sample for sample, role in roles.items() if role == "test"} == {
         f"{name}-noisy" for name in tested
     }
+
+
+def test_what_was_learned_besides_is_known(
+    small_dataset: PreparedDataset,
+    scene_dataset: PreparedDataset,
+    more_dataset: PreparedDataset,
+    tmp_path: Path,
+) -> None:
+    comparison = trained(tmp_path / "one", small_dataset, more_to_learn=(str(more_dataset.folder),))
+    joined = join_datasets([scene_dataset.folder, more_dataset.folder], tmp_path / "joined").folder
+    study(trained={"one": str(comparison)}, tested={"joined": str(joined)}).write_splits(tmp_path / "s")
+    (roles,) = read_splits(tmp_path / "s" / "one" / "joined" / "splits.csv")
+    assert {sample for sample, role in roles.items() if role == "unused"} == set(more_dataset.sample_ids)
 
 
 def test_weights_are_tested_as_they_are(

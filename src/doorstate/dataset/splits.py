@@ -68,6 +68,11 @@ def draw_splits(rows: Sequence[Row], protocol: str, seed: int) -> list[dict[str,
     return splits
 
 
+def origin(row: Row) -> str:
+    """What a learned and a tested sample may not share: the scene, whatever sensor saw it; else seed and name."""
+    return row.get("scene_id") or f"{row.get('seed', '')}/{row['sample_id']}"
+
+
 def _paper(rows: Sequence[Row], seed: int) -> list[dict[str, Role]]:
     tenths = _deal(
         [(row["state"], row.get("distance_band", ""), row.get("region", "")) for row in rows], seed

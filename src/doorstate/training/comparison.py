@@ -19,6 +19,7 @@ from doorstate.dataset.splits import (
     UNSEEN,
     Role,
     draw_splits,
+    origin,
     read_splits,
     write_splits,
 )
@@ -231,15 +232,15 @@ def prepare_comparison(experiment: Experiment, folder: Path) -> None:
 
 
 def _check_more(experiment: Experiment, dataset: PreparedDataset) -> None:
-    """Raise ConfigError for data sets to learn besides that share samples with the one that is tested."""
-    known = set(dataset.sample_ids)
+    """Raise ConfigError for data sets to learn besides that show scenes of the one that is tested."""
+    known = {origin(row) for row in dataset.rows}
     for path in experiment.more_to_learn:
         more = open_dataset(Path(path))
         check_states(more, more.sample_ids, experiment.heads)
-        if shared := sorted(known & set(more.sample_ids)):
+        if shared := [row["sample_id"] for row in more.rows if origin(row) in known]:
             raise ConfigError(
-                f"more_to_learn: {path} shares {len(shared)} samples with {experiment.dataset}, such as {shared[0]}; "
-                "make it with another seed"
+                f"more_to_learn: {len(shared)} samples of {path} show scenes of {experiment.dataset}, "
+                f"such as {shared[0]}: make it with another seed"
             )
 
 

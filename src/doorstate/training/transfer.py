@@ -3,14 +3,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, NamedTuple
 
 from pydantic import Field
 
 from doorstate.clouds.preparation import NUM_POINTS
-from doorstate.dataset.splits import UNSEEN, Role, read_splits, write_splits
+from doorstate.dataset.splits import UNSEEN, Role, origin, read_splits, write_splits
 from doorstate.dataset.store import open_dataset
 from doorstate.errors import ConfigError, RunError
 from doorstate.models import Frozen
@@ -79,7 +79,7 @@ class TransferStudy(Frozen):
         known = set[str]().union(*(_seen(comparison) for comparison in self.trained.values()))
         for tested, dataset in self.tested.items():
             roles: dict[str, Role] = {
-                row["sample_id"]: "unused" if _origin(row) in known else "test"
+                row["sample_id"]: "unused" if origin(row) in known else "test"
                 for row in open_dataset(Path(dataset)).rows
             }
             if "test" not in roles.values():
@@ -104,10 +104,12 @@ def load_transfer(path: Path) -> TransferStudy:
 def _seen(comparison: str) -> set[str]:
     """Origins of the samples that fold 0 of a comparison was trained or validated on."""
     roles = read_splits(Path(comparison) / "splits.csv")[0]
-    rows = open_dataset(Path(read_comparison(Path(comparison))["dataset"])).rows
-    return {_origin(row) for row in rows if roles[row["sample_id"]] in ("train", "val")}
-
-
-def _origin(row: Mapping[str, str]) -> str:
-    """What two samples may not share: the scene, whatever sensor saw it; without scenes seed and name."""
-    return row.get("scene_id") or f"{row.get('seed', '')}/{row['sample_id']}"
+    asked = read_comparison(Path(comparison))
+    rows = [
+        row
+        for row in open_dataset(Path(asked["dataset"])).rows
+        if roles[row["sample_id"]] in ("train", "val")
+    ]
+    for more in asked.get("more_to_learn", ()):
+        rows += open_dataset(Path(more)).rows
+    return {origin(row) for row in rows}
