@@ -289,6 +289,9 @@ def test_more_is_learned_in_every_fold_and_never_tested(
         assert tested[0] != tested[1]
     card = read_card(tmp_path / "both/runs/pointnet2/fold0/weights.safetensors")
     assert card.trained_on.endswith(f"fold 0, and {len(more_dataset)} samples besides")
+    only_tested = {"start_from": str(tmp_path / "alone"), "recipe_changes": CHANGES | {"epochs": 0}}
+    as_it_was = compare(more.model_copy(update=only_tested), tmp_path / "as-it-was")
+    assert [each["train_samples"] for each in as_it_was] == [each["train_samples"] for each in alone]
 
 
 def test_what_is_tested_is_not_learned_besides(small_dataset: PreparedDataset, tmp_path: Path) -> None:

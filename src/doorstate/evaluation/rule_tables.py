@@ -63,7 +63,7 @@ def open_table(results: ComparisonResults) -> Table:
         "Open or not",
         ("method", "recall of open", "precision of open", "accuracy", "no answer"),
         tuple(rows) if any(any(each.open_or_not) for each in pooled.values()) else (),
-        "Closed and semi-open are both not open. No answer is wrong.",
+        "Closed and semi-open are both not open. No answer counts as wrong.",
     )
 
 

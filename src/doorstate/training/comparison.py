@@ -291,6 +291,8 @@ def train_one(
     splits = read_splits(splits_path)
     if not 0 <= fold < len(splits):
         raise ConfigError(f"there is no fold {fold}: folds are 0 to {len(splits) - 1}")
+    recipe = experiment.recipe_of(network)
+    more_to_learn = experiment.more_to_learn if recipe.epochs else ()
     config = RunConfig(
         network=network,
         dataset=experiment.dataset,
@@ -298,12 +300,12 @@ def train_one(
         fold=fold,
         num_points=experiment.num_points,
         seed=experiment.seed,
-        recipe=experiment.recipe_of(network),
+        recipe=recipe,
         start_from=_weights_before(experiment, network, fold),
         heads=experiment.heads_of(network),
-        more_to_learn=experiment.more_to_learn,
+        more_to_learn=more_to_learn,
     )
-    more = [open_dataset(Path(each)) for each in experiment.more_to_learn]
+    more = [open_dataset(Path(each)) for each in more_to_learn]
     return fit(config, dataset, splits[fold], folder, more)
 
 
