@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Put trained weights into the package, as float16, with a model card each.
 
-python tools/package_weights.py runs/mixture-longer   # default weights, after `make publish EXPERIMENT=mixture-longer`
+python tools/package_weights.py runs/mixture-wide   # default weights, after `make publish EXPERIMENT=mixture-wide`
 python tools/package_weights.py runs/weights ogurob-  # with a name before the network's
 
 Weights of protocol `all` have seen every sample: how well their recipe does and how sure the answers are comes from the

@@ -4,7 +4,7 @@
 python tools/reproduce.py run paper            # data, all runs, report; goes on where it was stopped
 python tools/reproduce.py publish paper        # runs/paper -> results/paper, without weights
 python tools/reproduce.py build                # tables, figures, reports and docs/results.md from results/
-python tools/reproduce.py restore mixture-longer # results/ -> runs/mixture-longer, with the packaged weights
+python tools/reproduce.py restore mixture-wide # results/ -> runs/mixture-wide, with the packaged weights
 python tools/reproduce.py again pointnet2 0    # one run from nothing: is it within the published spread?
 python tools/reproduce.py check                # the same into a scratch folder: are the committed files those?
 """

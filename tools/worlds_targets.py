@@ -21,7 +21,7 @@ from doorstate.evaluation.stratum_tables import rows_of as manifest_of
 from doorstate.evaluation.table import Table, number
 from doorstate.types import NO_DOOR
 
-MIXTURE = "mixture-longer"  # the comparison of the page
+MIXTURE = "mixture-wide"  # the comparison of the page
 AT_4096 = "mixture-points/as-trained-4096"
 CLUTTER = "transfer/mixture/cluttered"
 _95 = 1.96  # standard errors to either side
