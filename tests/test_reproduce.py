@@ -116,11 +116,16 @@ def test_folds_that_all_methods_have_finished_are_shown(reproduce: ModuleType, t
     "path", sorted(REPOSITORY.glob("experiments/[!d]*.toml")), ids=lambda path: path.stem
 )
 def test_an_experiment_comes_after_its_data_and_what_it_begins_with(
-    path: Path, reproduce: ModuleType, monkeypatch: pytest.MonkeyPatch
+    path: Path, reproduce: ModuleType, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
+    import data_sets
+
     called: list[str] = []
-    monkeypatch.setattr(reproduce, "doorstate", lambda command, fine=(0,): called.append(command))
-    monkeypatch.setattr(reproduce, "commands", lambda folder: [f"make {folder.name}"])
+    monkeypatch.setattr(reproduce, "RUNS", tmp_path)
+    monkeypatch.setattr(reproduce, "doorstate", lambda arguments, makes=None: called.append(arguments))
+    monkeypatch.setattr(
+        reproduce, "commands", lambda folder: [data_sets.Command(f"make {folder.name}", folder)]
+    )
     reproduce.run(path.stem)
     made = [line.removeprefix("make ") for line in called if line.startswith("make ")]
     asked = tomllib.loads(path.read_text())
@@ -134,10 +139,18 @@ def test_an_experiment_comes_after_its_data_and_what_it_begins_with(
         assert number < own
 
 
-@pytest.mark.parametrize(("exit_code", "goes_on"), [(0, True), (1, True), (2, False)])
+@pytest.mark.parametrize(
+    ("exit_code", "made", "goes_on"), [(0, True, True), (1, True, True), (1, False, False), (2, True, False)]
+)
 def test_a_data_set_of_which_some_clouds_were_left_out_is_gone_on_with(
-    exit_code: int, goes_on: bool, reproduce: ModuleType, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    exit_code: int,
+    made: bool,
+    goes_on: bool,
+    reproduce: ModuleType,
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
 ) -> None:
+    import data_sets
     import doorstate_command
 
     program = tmp_path / "doorstate"
@@ -145,12 +158,33 @@ def test_a_data_set_of_which_some_clouds_were_left_out_is_gone_on_with(
         f'#!/bin/sh\necho "$1" >> {tmp_path}/called\ntest "$1" != simulate || exit {exit_code}\n'
     )
     program.chmod(0o755)
+    if made:
+        (tmp_path / "dataset.json").touch()
     monkeypatch.setattr(doorstate_command.sys, "executable", str(tmp_path / "python"))
-    monkeypatch.setattr(reproduce, "commands", lambda folder: ["simulate"])
+    monkeypatch.setattr(reproduce, "commands", lambda folder: [data_sets.Command("simulate", tmp_path)])
     with nullcontext() if goes_on else pytest.raises(SystemExit):
         reproduce.run("by-pose")
     called = (tmp_path / "called").read_text().split()
     assert called == (["simulate", "compare", "report"] if goes_on else ["simulate"])
+
+
+def test_what_an_experiment_begins_with_is_not_run_again_once_it_is_there(
+    reproduce: ModuleType, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    called: list[str] = []
+    monkeypatch.setattr(reproduce, "doorstate", lambda arguments, makes=None: called.append(arguments))
+    monkeypatch.setattr(reproduce, "commands", lambda folder: [])
+    monkeypatch.setattr(reproduce, "RUNS", tmp_path)
+    folder = tmp_path / "mixture-longer"
+    folder.mkdir()
+    (folder / "comparison.json").write_text('{"networks": ["pointnet2"], "rules": [], "folds": 1}')
+    for finished in (False, True):
+        if finished:
+            RunFolder(folder / "runs" / "pointnet2" / "fold0").finish({})
+        called.clear()
+        reproduce.run("mixture-wide")
+        assert any("mixture-longer.toml" in line for line in called) is not finished
+        assert any("mixture-wide.toml" in line for line in called)
 
 
 def test_data_sets_are_made_of_what_the_command_line_knows(reproduce: ModuleType, tmp_path: Path) -> None:
@@ -159,7 +193,7 @@ def test_data_sets_are_made_of_what_the_command_line_knows(reproduce: ModuleType
     seeds: dict[str, set[str]] = {}
     for name in data_sets.SIMULATED:
         (simulate,) = data_sets.commands(tmp_path / f"{name}-4096")
-        words = simulate.split()
+        words = simulate.arguments.split()
         seed = words[words.index("--seed") + 1] if "--seed" in words else "0"
         preset = words[words.index("--preset") + 1]
         scenes = words[words.index("--scenes") + 1] if "--scenes" in words else None
@@ -174,8 +208,12 @@ def test_data_sets_are_made_of_what_the_command_line_knows(reproduce: ModuleType
     }
     assert not seeds_of["mixture"] & seeds_of["more-mixture"], "what is learned besides is tested nowhere"
     *parts, join = data_sets.commands(tmp_path / "mixture-4096")
-    made = [line.split()[line.split().index("--prepared") + 1] for line in parts]
-    assert made == join.split()[1:-2]
+    made = [line.arguments.split()[line.arguments.split().index("--prepared") + 1] for line in parts]
+    assert made == join.arguments.split()[1:-2]
+    *parts, join = data_sets.commands(tmp_path / "more-mixture-1024")
+    assert all("--points 1024" in part.arguments for part in parts)
+    assert [f"data/{part.makes.name}" for part in parts] == join.arguments.split()[1:-2]
+    assert join.arguments.endswith("--out data/more-mixture-1024")
     (tmp_path / "mixture-4096").mkdir()
     (tmp_path / "mixture-4096" / "dataset.json").touch()
     assert list(data_sets.commands(tmp_path / "mixture-4096")) == []

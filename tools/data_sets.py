@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 SIMULATED = {
     "ogurob": "--preset ogurob",
@@ -24,7 +25,7 @@ SIMULATED = {
     "no-door-deepdoors2": "--preset no-door --scenes 300 --seed 18 --sensor deepdoors2",
     "varied-clean": "--preset varied --scenes 400 --seed 19",
     "no-door-clean": "--preset no-door --scenes 200 --seed 20",
-    # To learn besides: twice as much again of the same.
+    # To learn besides: twice as many other scenes of the same presets and cameras, more of the Xtion's among them.
     "more-varied-xtion": "--preset varied --scenes 2600 --seed 41 --sensor xtion",
     "more-varied-d435": "--preset varied --scenes 1300 --seed 42 --sensor d435",
     "more-varied-deepdoors2": "--preset varied --scenes 500 --seed 43 --sensor deepdoors2",
@@ -66,7 +67,14 @@ JOINED = {"mixture": _MIXED, "more-mixture": tuple(f"more-{part}" for part in _M
 BEYOND = "--thin --max-depth-m 5"
 
 
-def commands(prepared: Path) -> Iterator[str]:
+class Command(NamedTuple):
+    """Arguments of `doorstate`, and the prepared data set that they make."""
+
+    arguments: str
+    makes: Path
+
+
+def commands(prepared: Path) -> Iterator[Command]:
     """What `doorstate` has to be called with, in this order, for `data/NAME-POINTS`; steps that are done cost nothing.
 
     Raises:
@@ -75,11 +83,11 @@ def commands(prepared: Path) -> Iterator[str]:
     name, _, points = prepared.name.rpartition("-")
     if name not in JOINED:
         options = "" if name.endswith("ogurob") else f" {BEYOND}"
-        yield (
-            f"simulate {SIMULATED[name]} --out data/{name} --prepared data/{name}-{points} --points {points}{options}"
-        )
+        made = f"--prepared data/{name}-{points} --points {points}{options}"
+        yield Command(f"simulate {SIMULATED[name]} --out data/{name} {made}", prepared)
     elif not (prepared / "dataset.json").is_file():
         parts = [prepared.with_name(f"{part}-{points}") for part in JOINED[name]]
         for part in parts:
             yield from commands(part)
-        yield f"join {' '.join(f'data/{part.name}' for part in parts)} --out data/{name}-{points}"
+        joined = " ".join(f"data/{part.name}" for part in parts)
+        yield Command(f"join {joined} --out data/{name}-{points}", prepared)

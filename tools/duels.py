@@ -55,7 +55,10 @@ def cases_table(
         shares = (float(np.mean([right[method][sample] for sample in chosen])) for method in methods)
         lines.append((case, str(len(chosen)), *(number(share) for share in shares)))
     return Table(
-        "Accuracy by what the sample is", ("samples", "number", *methods), tuple(lines), "No answer counts as wrong."
+        "Accuracy by what the sample is",
+        ("samples", "number", *methods),
+        tuple(lines),
+        "No answer counts as wrong.",
     )
 
 

@@ -207,9 +207,18 @@ def _seems_a_door(pooled: Predictions, given: Answers | None) -> NDArray[np.bool
 
 
 def _studies(experiment: str) -> Iterator[Asked]:
-    """Published studies of the weights of an experiment."""
+    """Published studies of the weights of an experiment; what is published of other weights ends the tool."""
     for asked in map(read_asked, sorted(EXPERIMENTS.glob("*.toml"))):
-        if experiment in asked.begins_with and (RESULTS / asked.name).is_dir():
+        if asked.command == "compare" or experiment not in asked.begins_with:
+            continue
+        published = list((RESULTS / asked.name).rglob("comparison.json"))
+        begun_with = {Path(read_json(path)["start_from"]).name for path in published}
+        if published and experiment not in begun_with:
+            sys.exit(
+                f"{RESULTS / asked.name}: is of {' and '.join(sorted(begun_with))}, not of {experiment}: "
+                f"make reproduce EXPERIMENT={asked.name}, publish, and package again"
+            )
+        if published:
             yield asked
 
 

@@ -294,11 +294,30 @@ def test_more_is_learned_in_every_fold_and_never_tested(
     assert [each["train_samples"] for each in as_it_was] == [each["train_samples"] for each in alone]
 
 
-def test_what_is_tested_is_not_learned_besides(small_dataset: PreparedDataset, tmp_path: Path) -> None:
+def test_what_was_learned_besides_is_not_tested_later(
+    small_dataset: PreparedDataset, scene_dataset: PreparedDataset, tmp_path: Path
+) -> None:
+    first = experiment(scene_dataset, heads=("door",), more_to_learn=(str(small_dataset.folder),))
+    prepare_comparison(first, tmp_path / "first")
+    with pytest.raises(RunError, match=r"has learned all of .*, which is tested here"):
+        prepare_comparison(experiment(small_dataset, start_from=str(tmp_path / "first")), tmp_path / "after")
+
+
+def test_what_is_tested_is_not_learned_besides(
+    small_dataset: PreparedDataset, more_dataset: PreparedDataset, tmp_path: Path
+) -> None:
     itself = experiment(small_dataset, more_to_learn=(str(small_dataset.folder),))
     with pytest.raises(ConfigError, match=f"{len(small_dataset)} samples of .* show scenes of .*, such as p"):
         compare(itself, tmp_path / "comparison")
     assert not (tmp_path / "comparison").exists()
+    one_of_few_points = experiment(small_dataset, num_points=161, more_to_learn=(str(more_dataset.folder),))
+    with pytest.raises(ConfigError, match="holds 160 points a cloud, not 161"):
+        compare(one_of_few_points, tmp_path / "comparison")
+    thinned = tmp_path / "thinned"
+    shutil.copytree(more_dataset.folder, thinned)
+    more_dataset.description.model_copy(update={"thin": True}).save(thinned)
+    with pytest.raises(ConfigError, match="one was prepared with --thin"):
+        compare(experiment(small_dataset, more_to_learn=(str(thinned),)), tmp_path / "comparison")
     missing = experiment(small_dataset, more_to_learn=(str(tmp_path / "gone"),))
     with pytest.raises(DatasetError, match="no prepared data set here"):
         compare(missing, tmp_path / "comparison")

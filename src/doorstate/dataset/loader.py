@@ -84,14 +84,12 @@ class CloudLoader:
         chosen = [(dataset, list(sample_ids)), *((each, each.sample_ids) for each in more)]
         self.sample_ids = [sample for _, samples in chosen for sample in samples]
         loaded = [_load(source, samples, num_points, heads) for source, samples in chosen]
-        self._points = np.concatenate([each.points for each in loaded])
-        self.centroids = np.concatenate([each.centroids for each in loaded])  # (M, 3) metres
-        self._labels = np.concatenate([each.labels for each in loaded])
-        self._targets = {
-            name: np.concatenate([each.targets[name] for each in loaded]) for name in loaded[0].targets
-        }
-        known = [each.parts for each in loaded if each.parts is not None]
-        self._parts = np.concatenate(known) if known else None
+        self._points = _joined([each.points for each in loaded])
+        self.centroids = _joined([each.centroids for each in loaded])  # (M, 3) metres
+        self._labels = _joined([each.labels for each in loaded])
+        self._targets = {name: _joined([each.targets[name] for each in loaded]) for name in loaded[0].targets}
+        parts = [each.parts for each in loaded if each.parts is not None]
+        self._parts = _joined(parts) if parts else None
         self._neighbours = (
             None if find_neighbours is None else _KnownNeighbours(find_neighbours, self._points)
         )
@@ -135,6 +133,11 @@ class CloudLoader:
         if self._parts is not None:
             targets[PARTS] = torch.from_numpy(known_parts(self._parts[chosen]))
         return Batch(torch.from_numpy(points), torch.from_numpy(self._labels[chosen]), known, targets)
+
+
+def _joined(arrays: Sequence[np.ndarray]) -> np.ndarray:
+    """Arrays behind one another; one alone is large, and not copied."""
+    return arrays[0] if len(arrays) == 1 else np.concatenate(arrays)
 
 
 def _load(

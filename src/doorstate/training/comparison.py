@@ -226,17 +226,29 @@ def prepare_comparison(experiment: Experiment, folder: Path) -> None:
         earlier = read_comparison(before)
         if not set(experiment.networks) & set(earlier["networks"]):
             raise RunError(f"{before}: has none of {', '.join(experiment.networks)} to go on from")
+        if experiment.dataset in earlier.get("more_to_learn", ()):
+            raise RunError(f"{before}: has learned all of {experiment.dataset}, which is tested here")
         if earlier["dataset"] == experiment.dataset:  # in another, the same name is another sample
             _check_unseen(read_splits(splits_path), before)
     write_json(path, settings)
 
 
 def _check_more(experiment: Experiment, dataset: PreparedDataset) -> None:
-    """Raise ConfigError for data sets to learn besides that show scenes of the one that is tested."""
+    """Raise ConfigError for data sets to learn besides that show scenes of the one that is tested, or do not fit it."""
     known = {origin(row) for row in dataset.rows}
     for path in experiment.more_to_learn:
         more = open_dataset(Path(path))
         check_states(more, more.sample_ids, experiment.heads)
+        if more.num_points < experiment.num_points:
+            raise ConfigError(
+                f"more_to_learn: {path} holds {more.num_points} points a cloud, not {experiment.num_points}"
+            )
+        if more.description.thin != dataset.description.thin:
+            raise ConfigError(
+                f"more_to_learn: {path} and {experiment.dataset}: one was prepared with --thin; prepare one anew"
+            )
+        if PARTS in experiment.heads and dataset.knows_parts and not more.knows_parts:
+            raise ConfigError(f"more_to_learn: {path} holds no parts of points: leave out the head '{PARTS}'")
         if shared := [row["sample_id"] for row in more.rows if origin(row) in known]:
             raise ConfigError(
                 f"more_to_learn: {len(shared)} samples of {path} show scenes of {experiment.dataset}, "
