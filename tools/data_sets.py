@@ -11,6 +11,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+from doorstate.dataset.store import is_prepared
+
 SIMULATED = {
     "ogurob": "--preset ogurob",
     # To train on, alone and mixed; `varied` is `varied-xtion` without noise.
@@ -85,7 +87,7 @@ def commands(prepared: Path) -> Iterator[Command]:
         options = "" if name.endswith("ogurob") else f" {BEYOND}"
         made = f"--prepared data/{name}-{points} --points {points}{options}"
         yield Command(f"simulate {SIMULATED[name]} --out data/{name} {made}", prepared)
-    elif not (prepared / "dataset.json").is_file():
+    elif not is_prepared(prepared):
         parts = [prepared.with_name(f"{part}-{points}") for part in JOINED[name]]
         for part in parts:
             yield from commands(part)

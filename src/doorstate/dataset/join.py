@@ -42,8 +42,7 @@ def join_datasets(sources: Sequence[Path], folder: Path) -> PreparedDataset:
             raise ConfigError(
                 f"{source}: has {dataset.num_points} points a cloud, {sources[0]} has {num_points}; prepare one anew"
             )
-        if dataset.description.thin != datasets[0].description.thin:
-            raise ConfigError(f"{source} and {sources[0]}: one was prepared with --thin; prepare one anew")
+        check_thinned_alike(dataset, datasets[0])
     rows = [row for dataset in datasets for row in dataset.rows]
     name, count = Counter(row["sample_id"] for row in rows).most_common(1)[0]
     if count > 1:
@@ -69,6 +68,12 @@ def join_datasets(sources: Sequence[Path], folder: Path) -> PreparedDataset:
         doorstate_version=__version__,
     ).save(folder)
     return open_dataset(folder)
+
+
+def check_thinned_alike(one: PreparedDataset, other: PreparedDataset) -> None:
+    """Raise ConfigError for data sets that must not be learned together: only one was sampled as a predictor does."""
+    if one.description.thin != other.description.thin:
+        raise ConfigError(f"{one.folder} and {other.folder}: one was prepared with --thin; prepare one anew")
 
 
 def _is_begun(folder: Path) -> bool:

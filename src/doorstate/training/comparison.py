@@ -11,7 +11,8 @@ from typing import Any, NamedTuple, TypeVar
 from pydantic import Field, ValidationError
 
 from doorstate.clouds.preparation import NUM_POINTS
-from doorstate.dataset.loader import check_states
+from doorstate.dataset.join import check_thinned_alike
+from doorstate.dataset.loader import CloudLoader, check_states
 from doorstate.dataset.splits import (
     NUM_FOLDS,
     ONE_FOLD,
@@ -235,20 +236,14 @@ def prepare_comparison(experiment: Experiment, folder: Path) -> None:
 
 def _check_more(experiment: Experiment, dataset: PreparedDataset) -> None:
     """Raise ConfigError for data sets to learn besides that show scenes of the one that is tested, or do not fit it."""
-    known = {origin(row) for row in dataset.rows}
+    heads = {head for network in experiment.networks for head in experiment.heads_of(network)}
+    known = {origin(row) for row in dataset.rows} if experiment.more_to_learn else set()
     for path in experiment.more_to_learn:
         more = open_dataset(Path(path))
         check_states(more, more.sample_ids, experiment.heads)
-        if more.num_points < experiment.num_points:
-            raise ConfigError(
-                f"more_to_learn: {path} holds {more.num_points} points a cloud, not {experiment.num_points}"
-            )
-        if more.description.thin != dataset.description.thin:
-            raise ConfigError(
-                f"more_to_learn: {path} and {experiment.dataset}: one was prepared with --thin; prepare one anew"
-            )
-        if PARTS in experiment.heads and dataset.knows_parts and not more.knows_parts:
-            raise ConfigError(f"more_to_learn: {path} holds no parts of points: leave out the head '{PARTS}'")
+        check_thinned_alike(more, dataset)
+        # Whatever a later stage of a training would find missing, from one sample.
+        CloudLoader(more, more.sample_ids[:1], experiment.num_points, heads=sorted(heads))
         if shared := [row["sample_id"] for row in more.rows if origin(row) in known]:
             raise ConfigError(
                 f"more_to_learn: {len(shared)} samples of {path} show scenes of {experiment.dataset}, "
