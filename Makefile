@@ -22,7 +22,7 @@ check: setup
 	$(BIN)/ruff check src tests tools benchmarks examples ros2 docs/conf.py
 	$(BIN)/ruff format --check src tests tools benchmarks examples ros2 docs/conf.py
 	$(BIN)/mypy
-	$(BIN)/python tools/check_imports.py
+	$(BIN)/lint-imports --no-logo
 
 test: setup check
 	$(BIN)/python -m pytest -n auto

@@ -79,7 +79,7 @@ def networks(
     from benchmarks.networks import INFERENCE_BATCHES, Plan, run, table_of
     from benchmarks.store import Store
     from benchmarks.tables import failures
-    from doorstate.console import progress_bar
+    from doorstate.cli.console import progress_bar
 
     names, counts = _names(networks), _counts(points)
     given = {"pointnet": port_pointnet, "pointnet2": port_pointnet, "dgcnn": port_dgcnn}
@@ -121,7 +121,7 @@ def latency(
 ) -> None:
     """From a raw 640 x 480 cloud in memory to a state, stage by stage."""
     from benchmarks.latency import latency_table, measure
-    from doorstate.console import progress_bar
+    from doorstate.cli.console import progress_bar
 
     names, counts = _names(networks), _counts(points)
     with progress_bar("latency") as progress:
@@ -140,7 +140,7 @@ def rules(
 ) -> None:
     """From a raw 640 x 480 cloud in memory to a state by rules, and by two networks beside them."""
     from benchmarks.rules import measure, rules_table
-    from doorstate.console import progress_bar
+    from doorstate.cli.console import progress_bar
 
     with progress_bar("rules") as progress:
         rows = measure(count, points, threads, repeats, progress)
@@ -159,7 +159,7 @@ def profile(
     """Where the time of a training step and of an inference goes, by groups of operators."""
     from benchmarks.clouds import simulated_clouds
     from benchmarks.profiling import measure, profile_table, profiled_forms
-    from doorstate.console import progress_bar
+    from doorstate.cli.console import progress_bar
 
     if form not in ("plain", "fast", "both"):
         raise ConfigError(f"--form {form}: choose plain, fast or both")
@@ -176,7 +176,7 @@ def knn(out: Out, points: Points = _ALL_POINTS, repeats: Repeats = 5, threads: T
     """Nearest neighbours in the feature space of DGCNN."""
     from benchmarks.clouds import simulated_clouds
     from benchmarks.neighbours import knn_table, measure
-    from doorstate.console import progress_bar
+    from doorstate.cli.console import progress_bar
 
     counts = _counts(points)
     with progress_bar("knn") as progress:
@@ -193,7 +193,7 @@ def thinning(
 ) -> None:
     """Whether sampling some pixels, as a robot does, gives the answers of sampling all, as in training."""
     from benchmarks.thinning import measure, thinning_table
-    from doorstate.console import progress_bar
+    from doorstate.cli.console import progress_bar
 
     with progress_bar("thinning") as progress:
         rows = measure(network, count, progress)
@@ -212,12 +212,12 @@ def onnx(
 ) -> None:
     """What exported files say beside torch, in float32 and with matrices of 8-bit integers."""
     from benchmarks.onnx import measure, onnx_table
-    from doorstate.console import progress_bar
-    from doorstate.deployment.comparison_clouds import comparison_clouds
+    from doorstate.cli.console import progress_bar
+    from doorstate.inference.reference_clouds import reference_clouds
     from doorstate.training.run_folder import run_of
 
     with progress_bar("Simulating clouds to compare on") as progress:
-        compared_on = comparison_clouds(clouds, points, progress)
+        compared_on = reference_clouds(clouds, points, progress)
     rows = []
     for name in _names(networks):
         with progress_bar(name) as progress:
@@ -233,7 +233,7 @@ def gate(
 ) -> None:
     """What the gate refuses, and what becomes "open" with and without it, when data go missing."""
     from benchmarks.gate import gate_table, measure
-    from doorstate.console import progress_bar
+    from doorstate.cli.console import progress_bar
 
     with progress_bar("gate") as progress:
         rows = measure(network, count, progress)
@@ -248,7 +248,7 @@ def sensors(
 ) -> None:
     """Noise, steps, shadows and losses of the sensor models beside what is published of the sensors."""
     from benchmarks.sensors import measure, sensors_table
-    from doorstate.console import progress_bar
+    from doorstate.cli.console import progress_bar
 
     with progress_bar("sensors") as progress:
         rows = measure(range(frames), progress)
@@ -269,8 +269,8 @@ def service(
     The clients run on the same processors as the service.
     """
     from benchmarks.service import measure, service_table
-    from doorstate.console import progress_bar
-    from doorstate.jobs import default_workers
+    from doorstate._jobs import default_workers
+    from doorstate.cli.console import progress_bar
 
     counts, workers = _integers("--clients", clients, 1), workers or default_workers()
     options = ["--network", network, "--workers", str(workers)]
@@ -303,7 +303,7 @@ def fuzz(
     """
     from benchmarks.fuzz import fuzz_table, measure
     from benchmarks.fuzzer import FAILURES
-    from doorstate.console import progress_bar
+    from doorstate.cli.console import progress_bar
 
     with progress_bar("fuzz") as progress:
         rows = measure(first, inputs, seconds, workers, out / "fuzz-failures", progress)
@@ -330,7 +330,7 @@ def curves(
       python -m benchmarks curves --data data/ogurob-4096 --network dgcnn --points 256 --epochs 4 --out reports/speed
     """
     from benchmarks.curves import curves_table, draw_curves, train_both
-    from doorstate.clouds.augment import Augmentation
+    from doorstate.clouds.augmentation import Augmentation
     from doorstate.dataset.splits import draw_splits
     from doorstate.dataset.store import open_dataset
     from doorstate.training.fit import RunConfig
@@ -406,8 +406,8 @@ def _finish(out: Path, name: str, rows: list[dict[str, Any]], table: Table, **op
 
 
 def _tell(table: Table, path: Path, remarks: Sequence[str] = ()) -> None:
-    from doorstate.console import out as stdout
-    from doorstate.console import print_table
+    from doorstate.cli.console import out as stdout
+    from doorstate.cli.console import print_table
 
     print_table(table.title, table.columns, table.rows)
     for remark in remarks:

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
+from doorstate._jobs import Progress
 from doorstate.clouds.preparation import normalize
 from doorstate.dataset.store import open_dataset
-from doorstate.deployment.comparison_clouds import LabelledClouds, comparison_clouds, comparison_doors
 from doorstate.errors import ConfigError
-from doorstate.jobs import Progress
+from doorstate.inference.reference_clouds import LabelledClouds, reference_clouds, reference_rows
 from doorstate.simulation.frames import Frame, replay
 from doorstate.simulation.generate import PRESETS, SampleRow, draw_pose, pose_indices
 from doorstate.types import Points
@@ -33,7 +33,7 @@ def raw_cloud() -> Points:
 
 def raw_clouds(count: int) -> list[Points]:
     """As `raw_cloud`, of doors in all three states, poses spread over the room."""
-    return [replay(row).points for row in comparison_doors(count)]
+    return [replay(row).points for row in reference_rows(count)]
 
 
 def simulated_clouds(count: int, num_points: int) -> Clouds:
@@ -42,7 +42,7 @@ def simulated_clouds(count: int, num_points: int) -> Clouds:
     Raises:
         ConfigError: more points are asked for than a cloud has.
     """
-    return Clouds(*comparison_clouds(count, num_points))
+    return Clouds(*reference_clouds(count, num_points))
 
 
 def dataset_clouds(folder: Path, count: int, num_points: int) -> Clouds:
@@ -64,7 +64,7 @@ def dataset_clouds(folder: Path, count: int, num_points: int) -> Clouds:
 
 def comparison_frames(count: int, progress: Progress) -> Iterator[tuple[SampleRow, Frame]]:
     """Doors that no weights were trained on, as the camera sees them."""
-    for done, row in enumerate(comparison_doors(count)):
+    for done, row in enumerate(reference_rows(count)):
         progress(done, count)
         yield row, replay(row)
     progress(count, count)

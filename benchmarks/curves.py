@@ -12,11 +12,11 @@ from torch import Tensor
 
 from benchmarks.forms import plain_form
 from benchmarks.store import Group
+from doorstate._files import read_csv
 from doorstate.dataset.splits import Role
 from doorstate.dataset.store import PreparedDataset
 from doorstate.evaluation.figures import encode_figures, save_drawings
 from doorstate.evaluation.table import Table, number
-from doorstate.files import read_csv
 from doorstate.networks import create_network
 from doorstate.networks.base import Neighbourhoods, PointNetwork
 from doorstate.training import fit as training

@@ -16,11 +16,11 @@ from typing import Any
 from benchmarks.fuzzer import FAILURES, LIMIT_MIB, LIMIT_S, OUTCOMES, TARGETS, Fuzzer
 from benchmarks.store import Group
 from benchmarks.workers import Worker
+from doorstate._files import atomic_path
+from doorstate._jobs import Progress
 from doorstate.clouds.preparation import MIN_POINTS
 from doorstate.errors import RunError
 from doorstate.evaluation.table import Table
-from doorstate.files import atomic_path
-from doorstate.jobs import Progress
 
 
 def measure(

@@ -30,22 +30,22 @@ from benchmarks.mutations import (
     draw_image_message,
     draw_number,
 )
-from doorstate.clouds.bags import Bag, BagTopic, StampedCloud, open_bag
-from doorstate.clouds.camera import Intrinsics, Pinhole, read_intrinsics
-from doorstate.clouds.declared import MAX_POINTS
-from doorstate.clouds.io import (
+from doorstate.clouds.preparation import MIN_POINTS, is_measured
+from doorstate.errors import MAX_MESSAGE_LENGTH, CameraError, CloudError, DoorstateError
+from doorstate.inference.predictor import Predictor
+from doorstate.io.bags import Bag, BagTopic, StampedCloud, open_bag
+from doorstate.io.camera import Intrinsics, Pinhole, read_intrinsics
+from doorstate.io.messages import CLOUD, COMPRESSED_IMAGE, IMAGE, points_from_message
+from doorstate.io.readers import (
     CLOUD_SUFFIXES,
     ReadOptions,
     parse_cloud,
     points_from_depth,
     read_cloud,
 )
-from doorstate.clouds.messages import CLOUD, COMPRESSED_IMAGE, IMAGE, points_from_message
-from doorstate.clouds.preparation import MIN_POINTS, is_measured
-from doorstate.deployment.predictor import Predictor
-from doorstate.deployment.service import create_app
-from doorstate.deployment.workload import Limits
-from doorstate.errors import LONGEST_LINE, CameraError, CloudError, DoorstateError
+from doorstate.io.size_limits import MAX_POINTS
+from doorstate.serving.service import create_app
+from doorstate.serving.workload import Limits
 from doorstate.types import Points
 
 LIMIT_S = 1.0  # of processor time for one input
@@ -261,7 +261,7 @@ def _of_error(error: DoorstateError) -> Outcome:
 
 def _of_line(line: str) -> Outcome:
     """A refusal is one line that can be printed."""
-    if len(line.splitlines()) != 1 or len(line) > LONGEST_LINE:
+    if len(line.splitlines()) != 1 or len(line) > MAX_MESSAGE_LENGTH:
         return "crash", f"no line: {line!r}"
     return "refused", ""
 

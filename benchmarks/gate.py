@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from benchmarks.clouds import comparison_frames
 from benchmarks.store import Group
+from doorstate._jobs import Progress
 from doorstate.clouds.preparation import is_measured
-from doorstate.deployment.predictor import Predictor
 from doorstate.evaluation.table import Table
-from doorstate.jobs import Progress
+from doorstate.inference.predictor import Predictor
 from doorstate.simulation.frames import Frame, replay
 from doorstate.simulation.generate import SampleRow
 from doorstate.types import Part, Points

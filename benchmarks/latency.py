@@ -17,16 +17,16 @@ import numpy as np
 from benchmarks.clouds import raw_cloud
 from benchmarks.store import Group
 from benchmarks.tables import milliseconds
+from doorstate._jobs import Progress
+from doorstate._memory import keep_freed_memory
 from doorstate.clouds import preparation
-from doorstate.deployment import predictor
-from doorstate.deployment.comparison_clouds import LabelledClouds
-from doorstate.deployment.onnx_export import export_onnx
-from doorstate.deployment.onnx_network import OnnxNetwork
 from doorstate.evaluation.table import Table
-from doorstate.jobs import Progress
+from doorstate.inference import predictor
+from doorstate.inference.export import export_onnx
+from doorstate.inference.onnx_backend import OnnxBackend
+from doorstate.inference.reference_clouds import LabelledClouds
 from doorstate.networks import create_network
-from doorstate.training.card import WeightsCard
-from doorstate.training.environment import keep_freed_memory
+from doorstate.networks.card import WeightsCard
 from doorstate.training.fit import threads as use_threads
 from doorstate.types import Points
 
@@ -100,7 +100,7 @@ def _predictors(
             cloud = preparation.prepare_cloud(raw, points, thin=True).points[None]
             labels = np.zeros(1, dtype=np.int64)
             export_onnx(path, network, card, LabelledClouds(cloud, labels), int8=int8)
-        predictors[runtime] = predictor.Predictor(OnnxNetwork(path, threads), card, points)
+        predictors[runtime] = predictor.Predictor(OnnxBackend(path, threads), card, points)
     return predictors
 
 

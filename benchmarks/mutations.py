@@ -22,7 +22,7 @@ from numpy.lib import format as npy_format
 from numpy.typing import NDArray
 from PIL import Image
 
-from doorstate.clouds.io import CLOUD_SUFFIXES
+from doorstate.io.readers import CLOUD_SUFFIXES
 from doorstate.types import Points
 
 Edit = tuple[str, int, bytes]  # replace, insert, delete or cut; where; with what

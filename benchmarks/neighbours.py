@@ -16,11 +16,11 @@ from benchmarks.clouds import Clouds
 from benchmarks.store import Group
 from benchmarks.tables import milliseconds
 from benchmarks.timing import step_s
+from doorstate._jobs import Progress
 from doorstate.evaluation.table import Table
-from doorstate.jobs import Progress
 from doorstate.networks.dgcnn import DGCNN
-from doorstate.networks.ops import gather_rows
-from doorstate.networks.search import knn
+from doorstate.networks.kernels.ops import gather_rows
+from doorstate.networks.kernels.search import knn
 from doorstate.training.fit import threads as use_threads
 
 K = 20

@@ -17,9 +17,9 @@ from benchmarks.subjects import OperationCount, Subject, Task
 from benchmarks.tables import networks_table
 from benchmarks.timing import MatrixPeak
 from benchmarks.workers import Worker
+from doorstate._jobs import Progress
 from doorstate.errors import RunError
 from doorstate.evaluation.table import Table
-from doorstate.jobs import Progress
 from doorstate.training.environment import bf16_is_quick
 
 INFERENCE_BATCHES = (1, 16)

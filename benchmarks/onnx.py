@@ -8,12 +8,12 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from benchmarks.store import Group
-from doorstate.deployment.comparison_clouds import LabelledClouds
-from doorstate.deployment.onnx_export import TOLERANCE, export_onnx
+from doorstate._jobs import Progress
 from doorstate.errors import ExportError
 from doorstate.evaluation.table import UNDEFINED, Table
-from doorstate.jobs import Progress
-from doorstate.training.weights import load_weights
+from doorstate.inference.export import TOLERANCE, export_onnx
+from doorstate.inference.reference_clouds import LabelledClouds
+from doorstate.networks.weights import load_weights
 
 FORMS = ("onnxruntime", "onnxruntime int8")
 

@@ -14,8 +14,8 @@ from benchmarks.store import Group
 from benchmarks.subjects import Subject, Task
 from benchmarks.tables import milliseconds
 from benchmarks.workers import Worker
+from doorstate._jobs import Progress
 from doorstate.evaluation.table import UNDEFINED, Table
-from doorstate.jobs import Progress
 from doorstate.training.environment import bf16_is_quick
 
 # An operator belongs to the first group that has a part of its name; `_Name` is an autograd function of our own.

@@ -10,14 +10,14 @@ import numpy as np
 from benchmarks.clouds import raw_clouds
 from benchmarks.store import Group
 from benchmarks.tables import milliseconds
-from doorstate.deployment.predictor import Prediction, Predictor
-from doorstate.deployment.rule_predictor import RulePredictor
+from doorstate._jobs import Progress
+from doorstate._memory import keep_freed_memory
 from doorstate.evaluation.table import Table
-from doorstate.jobs import Progress
+from doorstate.inference.predictor import Prediction, Predictor
+from doorstate.inference.rule_predictor import RulePredictor
 from doorstate.networks import create_network
+from doorstate.networks.card import WeightsCard
 from doorstate.rules import list_rules
-from doorstate.training.card import WeightsCard
-from doorstate.training.environment import keep_freed_memory
 from doorstate.training.fit import threads as use_threads
 from doorstate.types import Points
 

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 
 from benchmarks.store import Group
-from doorstate.clouds.camera import Intrinsics
+from doorstate._jobs import Progress
 from doorstate.evaluation.table import Table
-from doorstate.jobs import Progress
+from doorstate.io.camera import Intrinsics
 from doorstate.simulation.noise.models import SENSORS, SensorModel, distort
 from doorstate.simulation.scene import Box, Material
 from doorstate.simulation.sensor import CameraPose, incidence, is_made_of, render, render_behind_glass

@@ -20,10 +20,10 @@ from benchmarks.clouds import raw_cloud
 from benchmarks.store import Group
 from benchmarks.tables import milliseconds
 from benchmarks.timing import resident_mib
-from doorstate.clouds.pcd import write_pcd
+from doorstate._jobs import Progress
 from doorstate.errors import RunError
 from doorstate.evaluation.table import Table
-from doorstate.jobs import Progress
+from doorstate.io.pcd import write_pcd
 
 _COMMAND = (sys.executable, "-c", "from doorstate.cli import main; main()", "serve", "--port", "0")
 _STOP_S = 60.0

@@ -7,9 +7,9 @@ import json
 from pathlib import Path
 from typing import Any
 
+from doorstate._files import write_text
 from doorstate.errors import ConfigError, RunError
 from doorstate.evaluation.table import Table
-from doorstate.files import write_text
 
 Group = dict[str, Any]
 

@@ -16,8 +16,8 @@ from torch.utils.flop_counter import flop_registry
 from benchmarks.clouds import Clouds
 from benchmarks.forms import AS_PORTS, Form, build_form, plain_form
 from benchmarks.timing import peak_resident_mib, reset_peak, resident_mib, step_s
+from doorstate._memory import keep_freed_memory
 from doorstate.networks import create_network
-from doorstate.training.environment import keep_freed_memory
 
 _SLOW_S = 1.0
 _SEED = 0

@@ -9,9 +9,9 @@ import numpy as np
 
 from benchmarks.clouds import comparison_frames
 from benchmarks.store import Group
-from doorstate.deployment.predictor import Prediction, Predictor
+from doorstate._jobs import Progress
 from doorstate.evaluation.table import Table, number
-from doorstate.jobs import Progress
+from doorstate.inference.predictor import Prediction, Predictor
 
 
 def measure(network: str, count: int, progress: Progress) -> list[Group]:

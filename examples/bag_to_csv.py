@@ -13,9 +13,9 @@ import sys
 from pathlib import Path
 
 from doorstate import Predictor
-from doorstate.clouds.bags import open_bag
-from doorstate.clouds.io import ReadOptions
 from doorstate.errors import DoorstateError
+from doorstate.io.bags import open_bag
+from doorstate.io.readers import ReadOptions
 
 
 def main(recording: Path, table: Path) -> None:

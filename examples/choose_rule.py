@@ -19,7 +19,7 @@ import numpy as np
 
 from doorstate import read_cloud
 from doorstate.dataset.class_folders import labelled_rows
-from doorstate.deployment.rule_predictor import RulePredictor
+from doorstate.inference.rule_predictor import RulePredictor
 from doorstate.rules import create_rule, list_rules
 from doorstate.types import DoorState
 

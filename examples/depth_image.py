@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from doorstate.clouds.camera import read_intrinsics
-from doorstate.clouds.depth import depth_to_points
-from doorstate.deployment.rule_predictor import RulePredictor
+from doorstate.inference.rule_predictor import RulePredictor
+from doorstate.io.camera import read_intrinsics
+from doorstate.io.depth import depth_to_points
 
 
 def main(picture: Path, camera: Path) -> None:

@@ -14,9 +14,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from doorstate import StateFilter, wait_for
-from doorstate.clouds.bags import open_bag
-from doorstate.deployment.rule_predictor import RulePredictor
 from doorstate.errors import DoorstateError
+from doorstate.inference.rule_predictor import RulePredictor
+from doorstate.io.bags import open_bag
 from doorstate.types import Points
 
 

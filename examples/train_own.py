@@ -14,10 +14,10 @@ import argparse
 from pathlib import Path
 
 from doorstate import Predictor, ReadOptions, read_cloud
+from doorstate.cli.console import progress_bar
 from doorstate.cli.training import compare_live
-from doorstate.clouds.io import UNITS_M, find_clouds
-from doorstate.console import progress_bar
 from doorstate.dataset.prepare import Preparation, prepare_dataset
+from doorstate.io.readers import UNITS_M, find_clouds
 from doorstate.training.comparison import load_experiment
 from doorstate.training.run_folder import run_of
 

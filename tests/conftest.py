@@ -17,12 +17,12 @@ from doorstate.dataset.join import join_datasets
 from doorstate.dataset.prepare import Preparation, prepare_dataset
 from doorstate.dataset.store import PreparedDataset
 from doorstate.networks import create_network
+from doorstate.networks.weights import WeightsCard, save_weights
 from doorstate.simulation.generate import PRESETS
 from doorstate.simulation.run import simulate_dataset
 from doorstate.simulation.scene_rows import SCENE_PRESETS
 from doorstate.simulation.sensor import DepthCamera
 from doorstate.simulation.settings import SceneSettings, SimulationSettings
-from doorstate.training.weights import WeightsCard, save_weights
 
 SMALL_POINTS = 160
 Run = Callable[..., tuple[int, str, str]]

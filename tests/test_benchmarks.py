@@ -25,10 +25,10 @@ from benchmarks.gate import FAULTS
 from benchmarks.mutations import MESSAGES
 from benchmarks.onnx import onnx_table
 
+from doorstate._jobs import no_progress
 from doorstate.dataset.store import PreparedDataset
-from doorstate.deployment.predictor import Prediction, packaged_weights
 from doorstate.errors import ConfigError, RunError
-from doorstate.jobs import no_progress
+from doorstate.inference.predictor import Prediction, packaged_weights
 from doorstate.rules import list_rules
 from doorstate.types import DoorState
 

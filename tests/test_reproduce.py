@@ -129,7 +129,10 @@ def test_an_experiment_comes_after_its_data_and_what_it_begins_with(
     reproduce.run(path.stem)
     made = [line.removeprefix("make ") for line in called if line.startswith("make ")]
     asked = tomllib.loads(path.read_text())
-    needed = [*(asked.get("tested", {}).values() or [asked["dataset"]]), *asked.get("more_to_learn", [])]
+    needed = [
+        *(asked.get("tested", {}).values() or [asked["dataset"]]),
+        *asked.get("extra_train_datasets", []),
+    ]
     assert {Path(each).name for each in needed} <= set(made)
     (own,) = (number for number, line in enumerate(called) if f"/{path.name}" in line)
     for before in asked.get("trained", {}).values() or filter(None, [asked.get("start_from")]):

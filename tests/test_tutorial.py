@@ -16,8 +16,8 @@ import pytest
 
 pytest.importorskip("rosbags")
 
-from doorstate.clouds.io import read_cloud
-from doorstate.clouds.pcd import write_pcd
+from doorstate.io.pcd import write_pcd
+from doorstate.io.readers import read_cloud
 from doorstate.simulation.generate import PRESETS
 from doorstate.simulation.run import simulate_dataset
 from doorstate.simulation.settings import SimulationSettings

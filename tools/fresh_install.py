@@ -17,7 +17,7 @@ import venv
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from doorstate.clouds.pcd import write_pcd
+from doorstate.io.pcd import write_pcd
 from doorstate.simulation.generate import PRESETS, simulate_pose
 from doorstate.types import STATES
 

@@ -27,7 +27,8 @@ from studies import Asked, read_asked, resolution_results, study_table
 from templates import template
 from zoo_page import PAGE, page
 
-from doorstate.clouds.augment import Augmentation
+from doorstate._files import write_text
+from doorstate.clouds.augmentation import Augmentation
 from doorstate.dataset.store import open_dataset
 from doorstate.evaluation.calibration import calibrate, reliability
 from doorstate.evaluation.factors import factors_table, kinds_table
@@ -37,11 +38,10 @@ from doorstate.evaluation.resolution import fewest_points
 from doorstate.evaluation.results import Answers, ComparisonResults, Predictions, load_results
 from doorstate.evaluation.score_tables import pooled_confusion
 from doorstate.evaluation.table import Table
-from doorstate.files import write_text
+from doorstate.networks.weights import load_weights, save_weights
 from doorstate.training.calibration import abstain_threshold, at_temperature
 from doorstate.training.run_folder import read_json, run_of
-from doorstate.training.weights import load_weights, save_weights
-from doorstate.types import STATES, SURE
+from doorstate.types import DECISION_THRESHOLD, STATES
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 RESULTS, EXPERIMENTS = REPOSITORY / "results", REPOSITORY / "experiments"
@@ -203,7 +203,7 @@ def _seems_a_door(pooled: Predictions, given: Answers | None) -> NDArray[np.bool
     if given is None or "p_door" not in given.columns:
         return np.ones(len(pooled), bool)
     p_door = dict(zip(given.sample_ids, given.columns["p_door"], strict=True))
-    return np.array([p_door[sample] >= SURE for sample in pooled.sample_ids])
+    return np.array([p_door[sample] >= DECISION_THRESHOLD for sample in pooled.sample_ids])
 
 
 def _studies(experiment: str) -> Iterator[Asked]:

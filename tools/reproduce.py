@@ -23,10 +23,10 @@ from doorstate_command import REPOSITORY, doorstate
 from published import publish, restore, rows_of
 from studies import read_asked, write_study
 
+from doorstate._jobs import default_workers
 from doorstate.dataset.store import open_dataset
 from doorstate.evaluation.figures import Drawing, draw_dataset
-from doorstate.evaluation.report import write_everything
-from doorstate.jobs import default_workers
+from doorstate.evaluation.report import write_report
 
 RESULTS, RUNS, EXPERIMENTS = REPOSITORY / "results", REPOSITORY / "runs", REPOSITORY / "experiments"
 PAGES = tuple(Path("docs") / name for name in ("results.md", "related.md", "worlds.md"))
@@ -73,7 +73,7 @@ def again(network: str, fold: int, name: str = "paper") -> str | None:
     The spread is twice the sample standard deviation over the published folds, around the fold's own figure, and not
     less than two samples: another machine rounds differently and so trains other weights.
     """
-    from doorstate.console import live_runs
+    from doorstate.cli.console import live_runs
     from doorstate.evaluation.metrics import mean_and_deviation
     from doorstate.training.comparison import Run, load_experiment, train_one
     from doorstate.training.run_folder import RunFolder, run_of
@@ -123,7 +123,7 @@ def build(root: Path) -> None:
             dataset = rows_of(folders[-1], RESULTS)
             out = root / "results" / folders[-1].name / "report"
             of_dataset = drawn[dataset].result()
-            waiting.append(pool.submit(write_everything, folders, out, dataset, folds, of_dataset))
+            waiting.append(pool.submit(write_report, folders, out, dataset, folds, of_dataset))
         for each in waiting:
             each.result()
     results_page, related_page, worlds_page = (root / page for page in PAGES)

@@ -17,6 +17,7 @@ from extrapolation import places_cases
 from published import rows_of
 from templates import template
 
+from doorstate._files import write_text
 from doorstate.clouds.preparation import NUM_POINTS
 from doorstate.dataset.store import open_dataset
 from doorstate.evaluation.join import load_joined
@@ -25,7 +26,6 @@ from doorstate.evaluation.resolution import load_resolution, resolution_table
 from doorstate.evaluation.results import ComparisonResults
 from doorstate.evaluation.score_tables import pooled_confusion
 from doorstate.evaluation.table import UNDEFINED, Table, number
-from doorstate.files import write_text
 from doorstate.training.recipes import AUTHORS
 from doorstate.training.run_folder import read_json, run_of
 from doorstate.types import STATES

@@ -16,7 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from doorstate.clouds.depth import depth_to_points
+from doorstate.io.depth import depth_to_points
 from doorstate.simulation.noise.models import SENSORS, apply
 from doorstate.simulation.scene import Door, build_scene
 from doorstate.simulation.sensor import CameraPose, render_behind_glass

@@ -45,7 +45,7 @@ class Asked(NamedTuple):
     def datasets(self) -> list[Path]:
         """Prepared data sets that it needs."""
         tested = self.content.get("tested", {}).values() or [self.content["dataset"]]
-        return [Path(each) for each in (*tested, *self.content.get("more_to_learn", ()))]
+        return [Path(each) for each in (*tested, *self.content.get("extra_train_datasets", ()))]
 
 
 def read_asked(path: Path) -> Asked:

@@ -13,11 +13,11 @@ from typing import NamedTuple
 from results_page import NAMES
 from templates import template
 
-from doorstate.deployment.predictor import packaged_networks, packaged_weights
-from doorstate.files import write_text
+from doorstate._files import write_text
+from doorstate.inference.predictor import packaged_networks, packaged_weights
 from doorstate.networks import create_network, list_networks
-from doorstate.training.card import WeightsCard
-from doorstate.training.weights import read_card
+from doorstate.networks.card import WeightsCard
+from doorstate.networks.weights import read_card
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "zoo.md"
 

@@ -12,10 +12,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from doorstate.clouds.io import ReadOptions, read_cloud
-    from doorstate.deployment.gate import Gate
-    from doorstate.deployment.predictor import Prediction, Predictor
-    from doorstate.deployment.stream import StateFilter, wait_for
+    from doorstate.inference.gate import Gate
+    from doorstate.inference.predictor import Prediction, Predictor
+    from doorstate.inference.stream import StateFilter, wait_for
+    from doorstate.io.readers import ReadOptions, read_cloud
     from doorstate.networks import create_network, list_networks
     from doorstate.types import DoorState
 
@@ -35,15 +35,15 @@ __all__ = [
 
 _HOME = {
     "DoorState": "doorstate.types",
-    "Gate": "doorstate.deployment.gate",
-    "Prediction": "doorstate.deployment.predictor",
-    "Predictor": "doorstate.deployment.predictor",
-    "ReadOptions": "doorstate.clouds.io",
-    "StateFilter": "doorstate.deployment.stream",
+    "Gate": "doorstate.inference.gate",
+    "Prediction": "doorstate.inference.predictor",
+    "Predictor": "doorstate.inference.predictor",
+    "ReadOptions": "doorstate.io.readers",
+    "StateFilter": "doorstate.inference.stream",
     "create_network": "doorstate.networks",
     "list_networks": "doorstate.networks",
-    "read_cloud": "doorstate.clouds.io",
-    "wait_for": "doorstate.deployment.stream",
+    "read_cloud": "doorstate.io.readers",
+    "wait_for": "doorstate.inference.stream",
 }
 
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from pydantic import ValidationError
 
-LONGEST_LINE = 1000  # letters: a file may name a million fields
+MAX_MESSAGE_LENGTH = 1000  # letters: a file may name a million fields
 _LONGEST_REASON = 160
 
 
@@ -35,7 +35,7 @@ class DoorstateError(Exception):
     def __str__(self) -> str:
         # Files name their parts, and files have names: line breaks and terminal escapes among them.
         line = "".join(letter if letter.isprintable() else " " for letter in super().__str__())
-        return line if len(line) <= LONGEST_LINE else f"{line[: LONGEST_LINE - 3]}..."
+        return line if len(line) <= MAX_MESSAGE_LENGTH else f"{line[: MAX_MESSAGE_LENGTH - 3]}..."
 
 
 class CloudError(DoorstateError):
@@ -86,12 +86,12 @@ class MissingExtraError(DoorstateError):
     """An optional package is needed and not installed."""
 
 
-def not_installed(what: str, *packages: str) -> MissingExtraError:
+def missing_extra(what: str, *packages: str) -> MissingExtraError:
     """What cannot be done, and how it can: by the packages' own names, as doorstate is on no index."""
     return MissingExtraError(f"{what} needs what is not installed: pip install {' '.join(packages)}")
 
 
-def first_problem(error: ValidationError, fields: Iterable[str] = ()) -> str:
+def first_validation_error(error: ValidationError, fields: Iterable[str] = ()) -> str:
     """Where the first problem of values lies, if not in the whole, and what it is; with all fields if one is wrong."""
     problem = error.errors()[0]
     told = ": ".join(filter(None, [".".join(map(str, problem["loc"])), problem["msg"]]))
@@ -99,6 +99,6 @@ def first_problem(error: ValidationError, fields: Iterable[str] = ()) -> str:
     return f"{told}; fields are {named}" if named else told
 
 
-def one_line(error: Exception) -> str:
+def summarize_exception(error: Exception) -> str:
     """What another library says, in one line that is not long."""
     return " ".join(f"{type(error).__name__}: {error}".split())[:_LONGEST_REASON]

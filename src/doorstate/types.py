@@ -34,9 +34,9 @@ class DoorState(IntEnum):
 STATES: tuple[str, ...] = tuple(state.label for state in DoorState)
 NO_DOOR: Final = "no_door"  # the label of a scene without one; no class of the networks
 DOOR, PARTS = "door", "parts"  # answers besides the state that several rooms name
-SURE = 0.5  # from here on a probability of yes is a yes
-NO_ANSWER = "no_answer"  # of a method that says so rather than guess
-ANSWERS: tuple[str, ...] = (*STATES, NO_ANSWER)
+DECISION_THRESHOLD = 0.5  # from here on a probability of yes is a yes
+ABSTAINED = "abstained"  # of a method that says so rather than guess
+PREDICTED_LABELS: tuple[str, ...] = (*STATES, ABSTAINED)
 
 
 class Part(IntEnum):

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from doorstate.clouds import sampling
-from doorstate.clouds.camera import Intrinsics
-from doorstate.clouds.depth import depth_to_points
 from doorstate.clouds.preparation import prepare_cloud
 from doorstate.clouds.sampling import bucket_farthest_points, farthest_point_indices
+from doorstate.io.camera import Intrinsics
+from doorstate.io.depth import depth_to_points
 from doorstate.simulation.frames import replay
 from doorstate.simulation.generate import PRESETS, draw_pose
 from doorstate.types import Indices, Points

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from doorstate._files import write_csv
 from doorstate.dataset.store import CLOUDS, MANIFEST, DatasetDescription
-from doorstate.files import write_csv
 from doorstate.simulation.generate import PRESETS
 from doorstate.simulation.run import simulate_dataset
 from doorstate.simulation.sensor import DepthCamera

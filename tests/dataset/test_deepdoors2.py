@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from doorstate.clouds.camera import Intrinsics, Pinhole
-from doorstate.clouds.depth import depth_to_points
-from doorstate.clouds.io import ReadOptions
 from doorstate.dataset.deepdoors2 import CAMERA, deepdoors2_rows, read_deepdoors2
 from doorstate.dataset.layouts import LAYOUTS, find_layout
 from doorstate.dataset.prepare import Preparation, prepare_dataset
 from doorstate.errors import CameraError, CloudReadError, ConfigError, DatasetError
+from doorstate.io.camera import Intrinsics, Pinhole
+from doorstate.io.depth import depth_to_points
+from doorstate.io.readers import ReadOptions
 from doorstate.simulation.scene import Door, build_scene
 from doorstate.simulation.sensor import CameraPose, render
 from doorstate.types import Part

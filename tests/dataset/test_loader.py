@@ -10,7 +10,7 @@ import pytest
 import torch
 from scipy.spatial.distance import pdist
 
-from doorstate.clouds.augment import Augmentation
+from doorstate.clouds.augmentation import Augmentation
 from doorstate.clouds.preparation import normalize
 from doorstate.dataset.loader import Batch, CloudLoader
 from doorstate.dataset.store import PreparedDataset, open_dataset

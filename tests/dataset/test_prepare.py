@@ -9,15 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from doorstate.clouds.io import ReadOptions, read_cloud
-from doorstate.clouds.pcd import write_pcd
+from doorstate._files import read_csv, write_csv
 from doorstate.clouds.preparation import prepare_cloud
 from doorstate.dataset import prepare
 from doorstate.dataset.prepare import REJECTED, Preparation, prepare_dataset
 from doorstate.dataset.store import CLOUDS, DESCRIPTION, MANIFEST, PARTS, open_dataset
 from doorstate.dataset.strata import distance_band, region
 from doorstate.errors import ConfigError, DatasetError
-from doorstate.files import read_csv, write_csv
+from doorstate.io.pcd import write_pcd
+from doorstate.io.readers import ReadOptions, read_cloud
 from doorstate.simulation.frames import replay
 from doorstate.simulation.manifest import unflatten
 from doorstate.types import STATES, Part

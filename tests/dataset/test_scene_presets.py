@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from doorstate._jobs import Shard
 from doorstate.dataset.loader import CloudLoader
 from doorstate.dataset.prepare import Preparation, prepare_dataset, prepare_shard
 from doorstate.dataset.splits import draw_splits
 from doorstate.errors import ConfigError
-from doorstate.jobs import Shard
 from doorstate.simulation.run import simulate_dataset
 from doorstate.simulation.scene_rows import PresetName, ScenePreset
 from doorstate.simulation.sensor import DepthCamera

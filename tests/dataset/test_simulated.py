@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
+from doorstate._jobs import Shard
 from doorstate.dataset import simulated
 from doorstate.dataset.prepare import Preparation, prepare_dataset
 from doorstate.dataset.simulated import Sampler, simulate_prepared
 from doorstate.errors import ConfigError
-from doorstate.jobs import Shard
 from doorstate.simulation import run
 from doorstate.simulation.run import simulate_dataset, simulate_shard
 from doorstate.simulation.scene_rows import PresetName, ScenePreset

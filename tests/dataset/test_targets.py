@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from doorstate.clouds.augment import Augmentation, apply_augmentation, draw_augmentation
+from doorstate.clouds.augmentation import Augmentation, apply_augmentation, draw_augmentation
 from doorstate.clouds.preparation import SCALE_M
 from doorstate.dataset.targets import Targets, augmented, door_targets, known_parts
 from doorstate.simulation.generate import PRESETS, draw_pose

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from doorstate._files import write_csv
 from doorstate.dataset.splits import draw_splits, read_splits, write_splits
 from doorstate.dataset.store import CLOUDS, MANIFEST, PARTS, DatasetDescription, PreparedDataset, open_dataset
 from doorstate.dataset.strata import distance_band, region
-from doorstate.files import write_csv
 from doorstate.simulation.generate import PRESETS, draw_pose, pose_indices
 from doorstate.simulation.manifest import flatten
 from doorstate.types import STATES, Part
@@ -109,7 +109,7 @@ def add_found() -> Callable[..., None]:
         for path in (folder / "runs" / method).rglob("predictions.csv"):
             if f"\n{sample_id}," in path.read_text():
                 record = {"sample_id": sample_id, "found": found}
-                path.with_name("found.jsonl").write_text(json.dumps(record) + "\n")
+                path.with_name("detections.jsonl").write_text(json.dumps(record) + "\n")
 
     return add
 

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from sklearn.metrics import log_loss
 
+from doorstate._files import read_csv, write_csv
 from doorstate.dataset.store import PreparedDataset
 from doorstate.evaluation.calibration import (
     BINS,
@@ -21,7 +22,6 @@ from doorstate.evaluation.calibration import (
     reliability_figure,
 )
 from doorstate.evaluation.results import ComparisonResults, load_results
-from doorstate.files import read_csv, write_csv
 from doorstate.training.calibration import fit_temperature
 
 

@@ -33,7 +33,7 @@ def test_a_duel_counts_what_only_one_has_right(
 ) -> None:
     first, second, third, fourth = samples_of(simulated, "open")[:4]
     wrong = {
-        "dgcnn": {first: "no_answer", second: "closed", third: "closed"},  # the rule
+        "dgcnn": {first: "abstained", second: "closed", third: "closed"},  # the rule
         "pointnet": {third: "semi_open", fourth: "semi_open"},
     }
     results = load_results(make_comparison(simulated, wrong))

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from doorstate.evaluation.frame_metrics import Metrics, Said, is_wrong, measure
 from doorstate.evaluation.frame_tables import frame_notes, frame_tables
 from doorstate.evaluation.metrics import grouped_interval, wilson_interval
-from doorstate.types import NO_ANSWER
+from doorstate.types import ABSTAINED
 
 LABELS = ["closed", "closed", "closed", "closed", "semi_open", "open", "no_door", "no_door", "openings"]
 DOORS = ["a", "a", "b", "c", "d", "e", "/1", "/2", "/3"]
@@ -23,12 +23,12 @@ SAID = [
     Said("closed", 0.9),
     Said("closed", 0.8),
     Said("open", 0.6),
-    Said(NO_ANSWER, 0.0),
+    Said(ABSTAINED, 0.0),
     Said("semi_open", 0.7),
     Said("open", 0.5),
     Said("closed", 0.9),
     Said("semi_open", 0.5),
-    Said(NO_ANSWER, 0.0),
+    Said(ABSTAINED, 0.0),
 ]
 
 
@@ -71,7 +71,7 @@ def test_counts_by_hand(metrics: Metrics) -> None:
     assert (metrics["frames"], metrics["groups"]) == (6, 5)
     assert metrics["states"] == {"closed": 4, "semi_open": 1, "open": 1}
     found = metrics["methods"]["net"]["all"]
-    assert (found["frames"], found["right"], found["no_answer"]) == (6, 4, 1)
+    assert (found["frames"], found["right"], found["abstained"]) == (6, 4, 1)
     assert found["confusion"] == [[2, 0, 1, 1], [0, 1, 0, 0], [0, 0, 1, 0]]
     closed = found["states"]["closed"]
     assert (closed["right"], closed["frames"], closed["groups"], closed["share"]) == (2, 4, 3, 0.5)
@@ -134,7 +134,7 @@ def test_tables_have_a_cell_for_every_column(metrics: Metrics) -> None:
 
 def test_a_state_is_wrong_where_there_is_no_door() -> None:
     assert is_wrong("closed", "open")
-    assert is_wrong("closed", NO_ANSWER)
+    assert is_wrong("closed", ABSTAINED)
     assert is_wrong("no_door", "closed")
-    assert not is_wrong("no_door", NO_ANSWER)
+    assert not is_wrong("no_door", ABSTAINED)
     assert not is_wrong("open", "open")

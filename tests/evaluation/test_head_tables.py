@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from doorstate._files import write_csv
 from doorstate.dataset.splits import draw_splits, write_splits
 from doorstate.dataset.store import PreparedDataset
 from doorstate.evaluation.factors import kinds_table
@@ -20,11 +21,10 @@ from doorstate.evaluation.head_tables import (
     parts_table,
     presence_table,
 )
-from doorstate.evaluation.report import write_everything
+from doorstate.evaluation.report import write_report
 from doorstate.evaluation.results import Answers, ComparisonResults, load_results
 from doorstate.evaluation.rule_tables import angle_table
 from doorstate.evaluation.table import UNDEFINED, Table
-from doorstate.files import write_csv
 from doorstate.types import NO_DOOR, STATES
 
 OFF = {
@@ -172,7 +172,7 @@ def test_angles_and_kinds_of_networks_are_in_the_other_tables(
 
 
 def test_the_report_shows_them(scene_dataset: PreparedDataset, tmp_path: Path) -> None:
-    page = write_everything([comparison(scene_dataset, tmp_path / "c")], tmp_path / "report")
+    page = write_report([comparison(scene_dataset, tmp_path / "c")], tmp_path / "report")
     text = page.read_text(encoding="utf-8")
     for title in (
         "Answers of further heads",

@@ -15,7 +15,7 @@ from doorstate.dataset.store import PreparedDataset
 from doorstate.evaluation.report import (
     render_report,
     write_dataset_figures,
-    write_everything,
+    write_report,
 )
 from doorstate.evaluation.results import load_results
 from doorstate.evaluation.tables import build_tables
@@ -73,8 +73,8 @@ def test_everything_is_written_self_contained_and_the_same_twice(
     ids = [row["sample_id"] for row in simulated.rows]
     wrong = {"pointnet": {ids[2]: "semi_open", ids[7]: "open"}, "dgcnn": {ids[2]: "semi_open"}}
     folder = make_comparison(simulated, wrong)
-    report = write_everything([folder], tmp_path / "one")
-    write_everything([folder], tmp_path / "two")
+    report = write_report([folder], tmp_path / "one")
+    write_report([folder], tmp_path / "two")
     files = sorted(path.relative_to(tmp_path / "one") for path in (tmp_path / "one").rglob("*.*"))
     assert {str(path.parent) for path in files} == {".", "tables", "figures"}
     for path in files:
@@ -107,7 +107,7 @@ def test_partial_and_imported(
     imported: PreparedDataset, make_comparison: Callable[..., Path], tmp_path: Path
 ) -> None:
     folder = make_comparison(imported, {"dgcnn": {"open/3": "closed"}}, missing=[("pointnet", 0)])
-    report = write_everything([folder], tmp_path / "out")
+    report = write_report([folder], tmp_path / "out")
     page = Page(report.read_text(encoding="utf-8"))
     assert all(address.startswith(("data:image/", "#")) for address in page.addresses())
     assert "Partial: 1 of 10 runs" in page.text

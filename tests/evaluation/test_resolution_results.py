@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from doorstate._files import write_csv
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import RunError
 from doorstate.evaluation.resolution import (
@@ -19,7 +20,6 @@ from doorstate.evaluation.resolution import (
     write_resolution,
 )
 from doorstate.evaluation.table import UNDEFINED
-from doorstate.files import write_csv
 
 from .conftest import MakeComparison
 

@@ -21,7 +21,7 @@ from doorstate.evaluation.score_tables import (
     summary_table,
 )
 from doorstate.evaluation.table import UNDEFINED, number
-from doorstate.types import NO_ANSWER, STATES
+from doorstate.types import ABSTAINED, STATES
 
 
 @pytest.fixture
@@ -49,14 +49,14 @@ def test_no_answer_is_a_column_and_a_miss(
     simulated: PreparedDataset, make_comparison: Callable[..., Path]
 ) -> None:
     ids = [row["sample_id"] for row in simulated.rows]
-    results = load_results(make_comparison(simulated, {"dgcnn": {ids[0]: NO_ANSWER, ids[3]: NO_ANSWER}}))
+    results = load_results(make_comparison(simulated, {"dgcnn": {ids[0]: ABSTAINED, ids[3]: ABSTAINED}}))
     table = confusion_table(results)
     assert table.columns[-2:] == ("no answer", "total")
     assert table.rows[3] == ("dgcnn", "closed", "38", "0", "0", "2", "40")
     closed = next(row for row in scores_table(results, simulated).rows if row[:2] == ("dgcnn", "closed"))
     found = dict(zip(scores_table(results, simulated).columns, closed, strict=True))
     assert (found["precision"], found["recall"]) == ("1.0000", "0.9500")
-    assert {error.predicted for error in results.error_rows} == {NO_ANSWER}
+    assert {error.predicted for error in results.error_rows} == {ABSTAINED}
     assert all(error.confidence == 0 for error in results.error_rows)
 
 

@@ -11,10 +11,10 @@ from types import ModuleType
 
 import pytest
 
+from doorstate._files import read_csv, write_csv
 from doorstate.dataset.store import PreparedDataset
-from doorstate.evaluation.report import write_everything
+from doorstate.evaluation.report import write_report
 from doorstate.evaluation.transfer import load_transfer_results, write_transfer
-from doorstate.files import read_csv, write_csv
 from doorstate.training.run_folder import RunFolder
 
 from .test_head_tables import comparison
@@ -70,7 +70,7 @@ def published(worlds: ModuleType, scene_dataset: PreparedDataset, tmp_path: Path
                 row["predicted"] = "closed" if row["state"] == "open" else "open"
         write_csv(path, answers)
     _add_rule(root / worlds.MIXTURE)
-    write_everything([root / worlds.MIXTURE], root / worlds.MIXTURE / "report", dataset)
+    write_report([root / worlds.MIXTURE], root / worlds.MIXTURE / "report", dataset)
     found = load_transfer_results(root / "transfer", ("mixture",), ("cluttered",), root)
     write_transfer(found, root / "transfer" / "report")
     return root

@@ -11,8 +11,8 @@ import torch
 from torch import Tensor, nn
 
 from doorstate.networks.dgcnn import DGCNN, EdgeConv, edge_moments
-from doorstate.networks.ops import gather_rows
-from doorstate.networks.search import knn
+from doorstate.networks.kernels.ops import gather_rows
+from doorstate.networks.kernels.search import knn
 
 
 def clouds(batch: int = 2, num_points: int = 128) -> Tensor:

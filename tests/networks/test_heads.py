@@ -21,8 +21,8 @@ from doorstate.networks.heads import (
     HingeSide,
     OpeningAngle,
     Widths,
+    add_heads,
     answers,
-    give_heads,
     joint_losses,
 )
 from doorstate.networks.layers import JoinedDense
@@ -52,7 +52,7 @@ def targets(num_points: int = 160) -> dict[str, Tensor]:
 def headed(name: str) -> PointNetwork:
     torch.manual_seed(0)
     network = create_network(name)
-    give_heads(network, [*HEADS, *(["parts"] if name in WITH_PARTS else [])])
+    add_heads(network, [*HEADS, *(["parts"] if name in WITH_PARTS else [])])
     return network
 
 
@@ -211,6 +211,6 @@ def test_a_joined_layer_is_a_layer_on_both() -> None:
 def test_errors_name_what_is_known() -> None:
     network = create_network("point2sequence")
     with pytest.raises(ConfigError, match="no head 'angel': did you mean 'angle'"):
-        give_heads(network, ["angel"])
+        add_heads(network, ["angel"])
     with pytest.raises(ConfigError, match="Point2Sequence has no per-point branch"):
-        give_heads(network, ["parts"])
+        add_heads(network, ["parts"])

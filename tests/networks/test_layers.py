@@ -10,9 +10,9 @@ import pytest
 import torch
 from torch import Tensor, nn
 
+from doorstate.networks.kernels.ops import gather_rows
+from doorstate.networks.kernels.search import ball_query
 from doorstate.networks.layers import Dense, DenseMax, PointLinear, PooledMLP, RowBatchNorm, set_batchnorm
-from doorstate.networks.ops import gather_rows
-from doorstate.networks.search import ball_query
 
 DTYPES = [torch.float64, torch.float32]
 

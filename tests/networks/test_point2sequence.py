@@ -10,8 +10,8 @@ import torch
 from torch import Tensor, nn
 
 from doorstate.errors import ConfigError
+from doorstate.networks.kernels.search import knn
 from doorstate.networks.point2sequence import AREAS, Attention, LSTMCell, Point2Sequence
-from doorstate.networks.search import knn
 
 
 def clouds(batch: int = 2, num_points: int = 128) -> Tensor:

@@ -8,8 +8,8 @@ import pytest
 import torch
 from torch import Tensor, nn
 
+from doorstate.networks.kernels.search import knn
 from doorstate.networks.pointcnn import Level, PointCNN, XConv
-from doorstate.networks.search import knn
 
 
 def clouds(batch: int = 2, num_points: int = 128) -> Tensor:

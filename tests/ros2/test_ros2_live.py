@@ -27,9 +27,9 @@ from sensor_msgs.msg import CameraInfo, Image, PointCloud2, PointField
 from std_msgs.msg import Bool, Header, String
 from visualization_msgs.msg import Marker, MarkerArray
 
-from doorstate.clouds.depth import points_from_optical
-from doorstate.deployment.predictor import Predictor
-from doorstate.deployment.watch_settings import WatchSettings
+from doorstate.inference.predictor import Predictor
+from doorstate.inference.watch_settings import WatchSettings
+from doorstate.io.depth import points_from_optical
 from doorstate.simulation.frames import replay
 from doorstate.simulation.generate import PRESETS, draw_pose
 from doorstate.types import Points

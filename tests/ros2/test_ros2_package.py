@@ -16,8 +16,8 @@ import pytest
 import yaml
 
 import doorstate
-from doorstate.deployment.watch import DoorWatch
-from doorstate.deployment.watch_settings import WatchSettings, parse_settings
+from doorstate.inference.watch import DoorWatch
+from doorstate.inference.watch_settings import WatchSettings, parse_settings
 
 ROS2 = Path(__file__).resolve().parents[2] / "ros2"
 PACKAGE = ROS2 / "doorstate_ros"

@@ -64,7 +64,7 @@ def test_a_void_that_is_seen_through_is_open(wall: int) -> None:
     answer = RULE(see(frame))
     assert answer.state == DoorState.OPEN
     assert answer.opening_width_m == pytest.approx(0.9, abs=0.15)
-    assert [shape.name for shape in answer.found] == ["wall", "opening"]
+    assert [shape.name for shape in answer.detections] == ["wall", "opening"]
 
 
 def test_a_void_without_readings_is_not_open() -> None:

@@ -25,7 +25,7 @@ def test_a_surface_across_the_lane_is_closed(distance: float) -> None:
     answer = RULE(see(door(0, distance_m=distance)))
     assert answer.state == DoorState.CLOSED
     assert answer.opening_angle_deg is None
-    assert answer.found[0].points_m[:, 0] == pytest.approx(distance, abs=0.05)
+    assert answer.detections[0].points_m[:, 0] == pytest.approx(distance, abs=0.05)
 
 
 def test_a_free_lane_is_open_though_the_lintel_is_above_it() -> None:

@@ -21,7 +21,7 @@ def test_the_same_cloud_has_the_same_answer(name: str) -> None:
         second.reason,
         second.opening_angle_deg,
     )
-    for one, other in zip(first.found, second.found, strict=True):
+    for one, other in zip(first.detections, second.detections, strict=True):
         np.testing.assert_array_equal(one.points_m, other.points_m)
 
 

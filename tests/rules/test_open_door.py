@@ -70,7 +70,7 @@ def test_an_opening_between_two_parts_of_a_wall_is_open(x_m: float, y_m: float, 
 
 def test_the_outline_is_the_opening_in_the_sensor_frame() -> None:
     answer = OpenDoorRule()(seen(WALL, 0.0, 3.0, lintel_m=2.0))
-    shapes = [(shape.name, shape.points_m) for shape in answer.found]
+    shapes = [(shape.name, shape.points_m) for shape in answer.detections]
     (outline,) = (points for name, points in shapes if name == "opening")
     # From 3 m, x of the scene is left of the camera; the lintel's lower edge is 1 m above it.
     np.testing.assert_allclose(outline[:, 0], 3.0, atol=0.02)

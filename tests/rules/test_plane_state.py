@@ -28,7 +28,7 @@ def test_the_angle_is_within_two_degrees_on_both_sides_of_perpendicular(angle: i
     answer = RULE(see(door(angle, wall_deg=wall)))
     assert answer.opening_angle_deg == pytest.approx(angle, abs=2)
     assert answer.state == (DoorState.OPEN if angle > 70 else DoorState.SEMI_OPEN)
-    assert {shape.name for shape in answer.found} == {"wall", "leaf"}
+    assert {shape.name for shape in answer.detections} == {"wall", "leaf"}
 
 
 @settings(max_examples=15, deadline=None, derandomize=True)
@@ -68,7 +68,7 @@ def test_a_leaf_behind_the_face_of_its_wall_is_closed() -> None:
     answer = RULE(see([*wall, ((2.6, 0.45), (2.6, -0.45), -0.99, 1.09)]))
     assert answer.state == DoorState.CLOSED
     assert answer.opening_angle_deg == pytest.approx(0, abs=2)
-    assert "leaf" in {shape.name for shape in answer.found}
+    assert "leaf" in {shape.name for shape in answer.detections}
 
 
 def test_the_width_of_the_opening_is_that_between_hinge_and_latch() -> None:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from doorstate.clouds.depth import depth_to_points
+from doorstate.io.depth import depth_to_points
 from doorstate.rules.wall_leaf_angle import WallLeafAngleRule
 from doorstate.simulation.frames import level
 from doorstate.simulation.sensor import CAMERAS
@@ -79,7 +79,7 @@ def test_angle_and_state_are_those_of_the_leaf(
     assert answer.opening_angle_deg == pytest.approx(angle_deg, abs=6 if edge_on else 2)
     assert answer.state is (DoorState.SEMI_OPEN if angle_deg < 70 else DoorState.OPEN)
     assert answer.open_or_not is (angle_deg >= 70)
-    assert {"wall", "leaf"} <= {shape.name for shape in answer.found}
+    assert {"wall", "leaf"} <= {shape.name for shape in answer.detections}
 
 
 @pytest.mark.parametrize("angle_deg", [20, 40, 60])
@@ -116,7 +116,7 @@ def test_an_opening_without_a_leaf_is_open_and_has_a_width(x_m: float) -> None:
 
 def test_the_outline_of_the_opening_stands_in_the_opening() -> None:
     answer = WallLeafAngleRule()(seen(wall(), 0.0, 2.5))
-    (opening,) = (shape.points_m for shape in answer.found if shape.name == "opening")
+    (opening,) = (shape.points_m for shape in answer.detections if shape.name == "opening")
     # The camera looks along -y of the scene from 2.5 m: x ahead, and y to the left is x of the scene.
     np.testing.assert_allclose(opening[:, 0], 2.5, atol=0.05)
     np.testing.assert_allclose(np.sort(opening[:, 1]), [-0.45, -0.45, 0.45, 0.45], atol=0.06)

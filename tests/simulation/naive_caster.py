@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from doorstate.clouds.camera import Intrinsics
+from doorstate.io.camera import Intrinsics
 from doorstate.simulation.scene import Box
 from doorstate.simulation.sensor import CameraPose
 from doorstate.types import Part

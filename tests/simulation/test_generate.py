@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from doorstate.clouds.depth import depth_to_points
+from doorstate._files import read_csv, write_csv
 from doorstate.errors import ConfigError
-from doorstate.files import read_csv, write_csv
+from doorstate.io.depth import depth_to_points
 from doorstate.simulation.frames import level, replay
 from doorstate.simulation.generate import PRESETS, Preset, SampleRow, draw_pose, pose_indices, simulate_pose
 from doorstate.simulation.manifest import flatten, unflatten

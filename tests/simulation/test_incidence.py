@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from doorstate.clouds.camera import Intrinsics
+from doorstate.io.camera import Intrinsics
 from doorstate.simulation.scene import Box
 from doorstate.simulation.sensor import (
     NO_BOX,

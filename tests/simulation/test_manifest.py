@@ -7,8 +7,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from doorstate._files import read_csv, write_csv
 from doorstate.errors import DatasetError
-from doorstate.files import read_csv, write_csv
 from doorstate.simulation.generate import PRESETS, SampleRow, draw_pose
 from doorstate.simulation.manifest import flatten, unflatten
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from doorstate.files import write_csv
+from doorstate._files import write_csv
 from doorstate.simulation.generate import PRESETS, draw_pose, pose_indices, simulate_pose
 from doorstate.simulation.manifest import flatten
 

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from doorstate.clouds.camera import Intrinsics
-from doorstate.clouds.depth import depth_to_points
+from doorstate.io.camera import Intrinsics
+from doorstate.io.depth import depth_to_points
 from doorstate.simulation.frames import level
 from doorstate.simulation.scene import Box
 from doorstate.simulation.sensor import CameraPose, render

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from doorstate.clouds.io import ReadOptions, read_cloud
 from doorstate.errors import ConfigError, DatasetError
+from doorstate.io.readers import ReadOptions, read_cloud
 from doorstate.simulation.frames import replay
 from doorstate.simulation.generate import PRESETS, pose_indices
 from doorstate.simulation.manifest import unflatten

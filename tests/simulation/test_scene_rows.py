@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from doorstate.files import read_csv, write_csv
+from doorstate._files import read_csv, write_csv
 from doorstate.simulation.doors import leaf_boxes
 from doorstate.simulation.frames import replay
 from doorstate.simulation.manifest import flatten, unflatten

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from doorstate._files import read_csv, write_csv
 from doorstate.errors import ConfigError
-from doorstate.files import read_csv, write_csv
 from doorstate.simulation.frames import replay
 from doorstate.simulation.generate import PRESETS, simulate_pose
 from doorstate.simulation.manifest import Row, flatten, unflatten

@@ -12,8 +12,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 
-from doorstate.clouds.camera import Intrinsics
-from doorstate.clouds.depth import depth_to_points
+from doorstate.io.camera import Intrinsics
+from doorstate.io.depth import depth_to_points
 from doorstate.simulation.scene import Box
 from doorstate.simulation.sensor import CAMERAS, CameraPose, DepthCamera, Render, cut_range, render
 from doorstate.types import Part

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from doorstate.clouds.camera import Intrinsics
+from doorstate.io.camera import Intrinsics
 from doorstate.simulation.sensor import Render
 from doorstate.simulation.shading import shade
 from doorstate.types import Part

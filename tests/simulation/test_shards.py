@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from doorstate._jobs import Shard
 from doorstate.errors import ConfigError, DatasetError
-from doorstate.jobs import Shard
 from doorstate.simulation.run import MANIFEST, read_settings, simulate_dataset, simulate_shard
 from doorstate.simulation.scene_rows import PresetName, ScenePreset
 from doorstate.simulation.sensor import DepthCamera

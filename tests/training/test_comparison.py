@@ -17,14 +17,14 @@ from typing import Any
 
 import pytest
 
+from doorstate._files import read_csv
 from doorstate.dataset.splits import read_splits
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import ConfigError, DatasetError, RunError
-from doorstate.files import read_csv
+from doorstate.networks.weights import read_card
 from doorstate.training.comparison import Experiment, compare, load_experiment, prepare_comparison, runs_of
 from doorstate.training.resolution import load_study
 from doorstate.training.transfer import load_transfer
-from doorstate.training.weights import read_card
 
 CHANGES = {"epochs": 4, "batch_size": 8, "precision": "fp32"}
 
@@ -275,7 +275,7 @@ def test_more_is_learned_in_every_fold_and_never_tested(
     small_dataset: PreparedDataset, more_dataset: PreparedDataset, tmp_path: Path
 ) -> None:
     plain = experiment(small_dataset, recipe_changes=CHANGES | {"epochs": 1})
-    more = plain.model_copy(update={"more_to_learn": (str(more_dataset.folder),)})
+    more = plain.model_copy(update={"extra_train_datasets": (str(more_dataset.folder),)})
     alone, both = (compare(each, tmp_path / name) for name, each in (("alone", plain), ("both", more)))
     for one, other in zip(alone, both, strict=True):
         assert other["train_samples"] == one["train_samples"] + len(more_dataset)
@@ -297,7 +297,7 @@ def test_more_is_learned_in_every_fold_and_never_tested(
 def test_what_was_learned_besides_is_not_tested_later(
     small_dataset: PreparedDataset, scene_dataset: PreparedDataset, tmp_path: Path
 ) -> None:
-    first = experiment(scene_dataset, heads=("door",), more_to_learn=(str(small_dataset.folder),))
+    first = experiment(scene_dataset, heads=("door",), extra_train_datasets=(str(small_dataset.folder),))
     prepare_comparison(first, tmp_path / "first")
     with pytest.raises(RunError, match=r"has learned all of .*, which is tested here"):
         prepare_comparison(experiment(small_dataset, start_from=str(tmp_path / "first")), tmp_path / "after")
@@ -306,18 +306,20 @@ def test_what_was_learned_besides_is_not_tested_later(
 def test_what_is_tested_is_not_learned_besides(
     small_dataset: PreparedDataset, more_dataset: PreparedDataset, tmp_path: Path
 ) -> None:
-    itself = experiment(small_dataset, more_to_learn=(str(small_dataset.folder),))
+    itself = experiment(small_dataset, extra_train_datasets=(str(small_dataset.folder),))
     with pytest.raises(ConfigError, match=f"{len(small_dataset)} samples of .* show scenes of .*, such as p"):
         compare(itself, tmp_path / "comparison")
     assert not (tmp_path / "comparison").exists()
-    one_of_few_points = experiment(small_dataset, num_points=161, more_to_learn=(str(more_dataset.folder),))
+    one_of_few_points = experiment(
+        small_dataset, num_points=161, extra_train_datasets=(str(more_dataset.folder),)
+    )
     with pytest.raises(ConfigError, match="holds 160 points a cloud, not 161"):
         compare(one_of_few_points, tmp_path / "comparison")
     thinned = tmp_path / "thinned"
     shutil.copytree(more_dataset.folder, thinned)
     more_dataset.description.model_copy(update={"thin": True}).save(thinned)
     with pytest.raises(ConfigError, match="one was prepared with --thin"):
-        compare(experiment(small_dataset, more_to_learn=(str(thinned),)), tmp_path / "comparison")
-    missing = experiment(small_dataset, more_to_learn=(str(tmp_path / "gone"),))
+        compare(experiment(small_dataset, extra_train_datasets=(str(thinned),)), tmp_path / "comparison")
+    missing = experiment(small_dataset, extra_train_datasets=(str(tmp_path / "gone"),))
     with pytest.raises(DatasetError, match="no prepared data set here"):
         compare(missing, tmp_path / "comparison")

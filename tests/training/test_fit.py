@@ -14,16 +14,16 @@ import torch
 from sklearn.metrics import f1_score
 from torch._dynamo.exc import TorchDynamoException
 
-from doorstate.clouds.augment import Augmentation
+from doorstate._files import read_csv
+from doorstate.clouds.augmentation import Augmentation
 from doorstate.dataset.splits import Role, draw_splits
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import ConfigError, DatasetError, RunError, WeightsError
-from doorstate.files import read_csv
 from doorstate.networks.pointnet2 import PointNet2
+from doorstate.networks.weights import load_weights
 from doorstate.training import fit as fit_module
 from doorstate.training.fit import RunConfig, fit
 from doorstate.training.recipes import Recipe, Stage, learning_rate
-from doorstate.training.weights import load_weights
 
 RECIPE = Recipe(
     name="test",

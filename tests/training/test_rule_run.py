@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 from sklearn.metrics import f1_score
 
+from doorstate._files import read_csv
 from doorstate.dataset.prepare import Preparation, prepare_dataset
 from doorstate.dataset.splits import Role
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import ConfigError, DatasetError
-from doorstate.files import read_csv
 from doorstate.rules import create_rule, list_rules
 from doorstate.training.comparison import Experiment, compare
 from doorstate.training.rule_run import RuleRunConfig, answer
-from doorstate.types import NO_ANSWER, STATES
+from doorstate.types import ABSTAINED, STATES
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +39,7 @@ def test_answers_are_those_of_the_rule_on_raw_frames(doors: PreparedDataset, tmp
     rule = create_rule("plane_state")
     for row in rows:
         expected = rule(doors.raw_cloud(doors.index_of(row["sample_id"])))
-        assert row["predicted"] == (NO_ANSWER if expected.state is None else expected.state.label)
+        assert row["predicted"] == (ABSTAINED if expected.state is None else expected.state.label)
         assert row["reason"] == expected.reason
         assert (row["opening_angle_deg"] == "") == (expected.opening_angle_deg is None)
         assert row["open_or_not"] == {None: "", True: "open", False: "not_open"}[expected.open_or_not]
@@ -52,9 +52,9 @@ def test_answers_are_those_of_the_rule_on_raw_frames(doors: PreparedDataset, tmp
         zero_division=0,
     )
     assert metrics["test_macro_f1"] == pytest.approx(oracle)
-    assert metrics["no_answer"] == sum(row["predicted"] == NO_ANSWER for row in rows)
+    assert metrics["abstained"] == sum(row["predicted"] == ABSTAINED for row in rows)
     missed = {row["sample_id"] for row in rows if row["predicted"] != row["state"]}
-    found = [json.loads(line) for line in (tmp_path / "found.jsonl").read_text().splitlines()]
+    found = [json.loads(line) for line in (tmp_path / "detections.jsonl").read_text().splitlines()]
     assert {each["sample_id"] for each in found} == missed
     for each in found:
         for name, points in each["found"]:

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
+from doorstate._files import read_csv, write_csv
 from doorstate.dataset.join import join_datasets
 from doorstate.dataset.splits import draw_splits, read_splits, write_splits
 from doorstate.dataset.store import MANIFEST, PreparedDataset
 from doorstate.errors import ConfigError, RunError
-from doorstate.files import read_csv, write_csv
 from doorstate.training.comparison import Experiment, compare, prepare_comparison
 from doorstate.training.run_folder import read_json
 from doorstate.training.transfer import TransferStudy, load_transfer
@@ -72,7 +72,7 @@ def test_what_was_learned_besides_is_known(
     more_dataset: PreparedDataset,
     tmp_path: Path,
 ) -> None:
-    comparison = trained(tmp_path / "one", small_dataset, more_to_learn=(str(more_dataset.folder),))
+    comparison = trained(tmp_path / "one", small_dataset, extra_train_datasets=(str(more_dataset.folder),))
     joined = join_datasets([scene_dataset.folder, more_dataset.folder], tmp_path / "joined").folder
     study(trained={"one": str(comparison)}, tested={"joined": str(joined)}).write_splits(tmp_path / "s")
     (roles,) = read_splits(tmp_path / "s" / "one" / "joined" / "splits.csv")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The node: messages in, messages out; what is said of them is the library's (doorstate.deployment.watch)."""
+"""The node: messages in, messages out; what is said of them is the library's (doorstate.inference.watch)."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from sensor_msgs.msg import CameraInfo, CompressedImage, Image, PointCloud2
 from std_msgs.msg import Bool, ColorRGBA, Header, String
 from visualization_msgs.msg import Marker, MarkerArray
 
-from doorstate.deployment.watch import UNKNOWN, DoorWatch, Report
-from doorstate.deployment.watch_settings import WatchSettings, parse_settings
 from doorstate.errors import DoorstateError
+from doorstate.inference.watch import UNKNOWN, DoorReport, DoorWatch
+from doorstate.inference.watch_settings import WatchSettings, parse_settings
 
 ROS_PARAMETERS = {"use_sim_time", "start_type_description_service"}  # that every node has
 INPUTS = {"cloud": PointCloud2, "depth": Image, "compressed_depth": CompressedImage}
@@ -83,7 +83,7 @@ class DoorNode:
     def _on_silence(self) -> None:
         self._publish(self._watch.silence(self._now_ns()), DiagnosticStatus.STALE)
 
-    def _publish(self, report: Report, level: bytes) -> None:
+    def _publish(self, report: DoorReport, level: bytes) -> None:
         self._state.publish(String(data=report.state))
         self._open.publish(Bool(data=report.is_open))
         header = Header(frame_id=report.frame_id, stamp=stamp(report.stamp_ns))
@@ -113,7 +113,7 @@ def stamp(stamp_ns: int) -> Time:
     return Time(sec=stamp_ns // 10**9, nanosec=stamp_ns % 10**9)
 
 
-def diagnostic(node: Node, report: Report, level: bytes) -> DiagnosticStatus:
+def diagnostic(node: Node, report: DoorReport, level: bytes) -> DiagnosticStatus:
     return DiagnosticStatus(
         level=level,
         name=f"{node.get_name()}: door",
@@ -122,7 +122,7 @@ def diagnostic(node: Node, report: Report, level: bytes) -> DiagnosticStatus:
     )
 
 
-def markers(header: Header, report: Report, shown_for: Duration) -> list[Marker]:
+def markers(header: Header, report: DoorReport, shown_for: Duration) -> list[Marker]:
     """A label, and what a rule found; they replace all before."""
     red, green, blue = COLOURS[report.state]
     common: dict[str, Any] = {

@@ -13,16 +13,16 @@ from typing import Annotated
 import typer
 
 from doorstate import __version__
-from doorstate.cli.answers import info, predict
-from doorstate.cli.data import join, prepare, simulate
-from doorstate.cli.evaluation import evaluate
+from doorstate.cli.dataset import join, prepare, simulate
+from doorstate.cli.evaluate import evaluate
 from doorstate.cli.export import export
+from doorstate.cli.export_sdf import export_sdf
+from doorstate.cli.predict import info, predict
 from doorstate.cli.resolution import resolution
-from doorstate.cli.service import serve
+from doorstate.cli.serve import serve
 from doorstate.cli.training import compare, report, train
 from doorstate.cli.transfer import transfer
-from doorstate.cli.viewing import view
-from doorstate.cli.worlds import export_sdf
+from doorstate.cli.view import view
 from doorstate.errors import ConfigError, DoorstateError
 
 

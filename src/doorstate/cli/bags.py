@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from doorstate.cli.predictions import destination
-from doorstate.deployment.answers import described
+from doorstate.cli.output import destination
 from doorstate.errors import CloudReadError, DoorstateError
+from doorstate.inference.serialization import described
 
 if TYPE_CHECKING:
-    from doorstate.clouds.bags import BagTopic, StampedCloud
-    from doorstate.clouds.io import ReadOptions
+    from doorstate.io.bags import BagTopic, StampedCloud
+    from doorstate.io.readers import ReadOptions
 
 
 def predict_bag(
@@ -29,8 +29,8 @@ def predict_bag(
     as_json: bool,
 ) -> None:
     """Answer the messages of one topic into a file, or onto standard output as a table or JSON lines."""
-    from doorstate.clouds.bags import open_bag
-    from doorstate.console import err, progress_bar
+    from doorstate.cli.console import err, progress_bar
+    from doorstate.io.bags import open_bag
 
     count = failures = 0
     with open_bag(path) as bag:
@@ -53,8 +53,8 @@ def predict_bag(
 
 def hint_at_frame(topic: BagTopic, options: ReadOptions, frame_id: str) -> None:
     """Say so where clouds that are taken as they are come in an optical frame."""
-    from doorstate.clouds.messages import CLOUD, is_optical
-    from doorstate.console import err
+    from doorstate.cli.console import err
+    from doorstate.io.messages import CLOUD, is_optical
 
     if topic.type == CLOUD and options.frame == "body" and is_optical(frame_id):
         hint = f"{topic.name} is in the frame {frame_id}: is --frame optical missing?"

@@ -37,13 +37,13 @@ def export(
       doorstate export dgcnn --weights runs/paper/runs/dgcnn/fold0/weights.safetensors
       doorstate predict cloud.pcd --weights pointnet2.onnx
     """
-    from doorstate.console import out as stdout
-    from doorstate.console import progress_bar
-    from doorstate.deployment.comparison_clouds import comparison_clouds
-    from doorstate.deployment.onnx_export import TOLERANCE, check_installed, export_onnx
-    from doorstate.deployment.predictor import packaged_weights
-    from doorstate.files import check_writable
-    from doorstate.training.weights import load_weights
+    from doorstate._files import check_writable
+    from doorstate.cli.console import out as stdout
+    from doorstate.cli.console import progress_bar
+    from doorstate.inference.export import TOLERANCE, check_installed, export_onnx
+    from doorstate.inference.predictor import packaged_weights
+    from doorstate.inference.reference_clouds import reference_clouds
+    from doorstate.networks.weights import load_weights
 
     path = out or Path(f"{network}{'-int8' if int8 else ''}.onnx")
     if path.suffix != ".onnx":
@@ -54,7 +54,7 @@ def export(
     if weights is not None and card.network != network:
         raise ConfigError(f"{weights}: weights of {card.network}, not of {network}")
     with progress_bar("Simulating clouds to compare on") as progress:
-        compared_on = comparison_clouds(clouds, points or card.points, progress)
+        compared_on = reference_clouds(clouds, points or card.points, progress)
     with progress_bar(f"Exporting {network}") as progress:
         found = export_onnx(path, loaded, card, compared_on, opset=opset, int8=int8, progress=progress)
     stdout.print(

@@ -12,7 +12,7 @@ import typer
 from doorstate.errors import CameraError, ConfigError
 
 if TYPE_CHECKING:
-    from doorstate.clouds.io import ReadOptions
+    from doorstate.io.readers import ReadOptions
 
 # What a cloud file does not say about itself: the same options for `predict` and `prepare`.
 Frame = Annotated[
@@ -86,8 +86,8 @@ def read_options(
     layout: str | None = None,
 ) -> ReadOptions:
     """What the options say of cloud files; one error line for what does not fit together."""
-    from doorstate.clouds.camera import read_intrinsics
-    from doorstate.clouds.io import options_from_flags
+    from doorstate.io.camera import read_intrinsics
+    from doorstate.io.readers import options_from_flags
 
     if layout is not None and (frame, roll, units, depth_scale) != ("body", 0, "m", 0.001):
         raise ConfigError(

@@ -26,18 +26,18 @@ def resolution(
       doorstate resolution experiments/resolution.toml
       doorstate resolution experiments/resolution.toml --jobs 2 --out runs/points
     """
+    from doorstate._files import write_csv
+    from doorstate._memory import keep_freed_memory
+    from doorstate.cli.console import print_table, progress_bar
     from doorstate.cli.training import compare_live
-    from doorstate.console import print_table, progress_bar
     from doorstate.dataset.store import open_dataset
-    from doorstate.deployment.predictor import Predictor, median_milliseconds
     from doorstate.evaluation.resolution import (
         LATENCY,
         load_resolution,
         resolution_table,
         write_resolution,
     )
-    from doorstate.files import write_csv
-    from doorstate.training.environment import keep_freed_memory
+    from doorstate.inference.predictor import Predictor, median_milliseconds
     from doorstate.training.resolution import load_study
     from doorstate.training.run_folder import AS_TRAINED, run_of
 

@@ -38,8 +38,8 @@ def train(
       doorstate train dgcnn --data data/ogurob-4096 --recipe authors --set batch_size=16 --out runs/dgcnn
       doorstate train pointnet2 --data data/varied-4096 --protocol by-scene --heads door,angle,frame --out runs/heads
     """
-    from doorstate.console import live_runs
-    from doorstate.console import out as stdout
+    from doorstate.cli.console import live_runs
+    from doorstate.cli.console import out as stdout
     from doorstate.dataset.splits import draw_splits, write_splits
     from doorstate.dataset.store import open_dataset
     from doorstate.training.comparison import Run, load_experiment, train_one
@@ -107,8 +107,8 @@ def compare(
       doorstate compare experiments/one-fold.toml
       doorstate compare --data data/ogurob-4096 --protocol by-pose --networks pointnet,dgcnn --out runs/two
     """
-    from doorstate.console import out as stdout
-    from doorstate.console import print_table
+    from doorstate.cli.console import out as stdout
+    from doorstate.cli.console import print_table
     from doorstate.dataset.splits import EVERYTHING
     from doorstate.training.comparison import load_experiment
 
@@ -164,10 +164,10 @@ def report(
       doorstate report runs/paper runs/related --out reports/all
       doorstate report data/ogurob-4096 --out reports/data
     """
-    from doorstate.console import err
-    from doorstate.console import out as stdout
+    from doorstate.cli.console import err
+    from doorstate.cli.console import out as stdout
     from doorstate.dataset.store import is_prepared
-    from doorstate.evaluation.report import write_dataset_figures, write_everything
+    from doorstate.evaluation.report import write_dataset_figures, write_report
 
     alone = len(folders) == 1 and not (folders[0] / "comparison.json").is_file()
     if alone and not is_prepared(folders[0]):
@@ -176,13 +176,13 @@ def report(
         )
     target = out or folders[0] / "report"
     with err.status("Writing the report"):
-        page = write_dataset_figures(folders[0], target) if alone else write_everything(folders, target, data)
+        page = write_dataset_figures(folders[0], target) if alone else write_report(folders, target, data)
     stdout.print(f"report: {page}", soft_wrap=True)
 
 
 def compare_live(experiment: Experiment, folder: Path, jobs: int) -> list[dict[str, Any]]:
     """Run a comparison and show how far it is; metrics of every run."""
-    from doorstate.console import live_runs
+    from doorstate.cli.console import live_runs
     from doorstate.training.comparison import compare as run_comparison
     from doorstate.training.comparison import runs_of
 

@@ -24,9 +24,9 @@ def transfer(
       doorstate transfer experiments/transfer.toml
       doorstate transfer experiments/transfer.toml --jobs 2 --out runs/elsewhere
     """
+    from doorstate.cli.console import out as stdout
+    from doorstate.cli.console import print_table
     from doorstate.cli.training import compare_live
-    from doorstate.console import out as stdout
-    from doorstate.console import print_table
     from doorstate.evaluation.transfer import load_transfer_results, transfer_table, write_transfer
     from doorstate.training.transfer import load_transfer
 

@@ -10,10 +10,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar
 
-from doorstate.clouds.io import find_clouds
+from doorstate._files import read_csv
 from doorstate.dataset.strata import distance_band, polar, region
 from doorstate.errors import DatasetError
-from doorstate.files import read_csv
+from doorstate.io.readers import find_clouds
 from doorstate.types import NO_DOOR, DoorState
 
 # Order matters: "semi-open" and "half closed" hold the other words too.

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from doorstate import __version__
+from doorstate._files import atomic_path, is_vacant, write_csv
 from doorstate.dataset.store import (
     CLOUDS,
     MANIFEST,
@@ -19,7 +20,6 @@ from doorstate.dataset.store import (
     open_dataset,
 )
 from doorstate.errors import ConfigError, DatasetError
-from doorstate.files import atomic_path, is_vacant, write_csv
 
 _BESIDE = " + "  # between the sources of a joined data set, each named once
 

@@ -9,12 +9,12 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
-from doorstate.clouds.camera import Intrinsics, Pinhole
-from doorstate.clouds.io import DEFAULT_OPTIONS, ReadOptions, find_clouds, read_cloud
+from doorstate._files import read_csv
 from doorstate.dataset.class_folders import label_of_folder, nearest, row_of
 from doorstate.dataset.layouts import find_layout
 from doorstate.errors import ConfigError, DatasetError
-from doorstate.files import read_csv
+from doorstate.io.camera import Intrinsics, Pinhole
+from doorstate.io.readers import DEFAULT_OPTIONS, ReadOptions, find_clouds, read_cloud
 from doorstate.types import Points
 
 INDEX = "index.csv"

@@ -11,10 +11,15 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from doorstate.clouds.augment import Augmentation, AugmentationDraw, apply_augmentation, draw_augmentation
+from doorstate.clouds.augmentation import (
+    Augmentation,
+    AugmentationDraw,
+    apply_augmentation,
+    draw_augmentation,
+)
 from doorstate.clouds.preparation import centroids, normalize
 from doorstate.dataset.store import PreparedDataset
-from doorstate.dataset.targets import NO_STATE, augmented, door_targets, known_parts
+from doorstate.dataset.targets import IGNORE_INDEX, augmented, door_targets, known_parts
 from doorstate.errors import ConfigError
 from doorstate.types import DOOR, PARTS, DoorState
 
@@ -74,7 +79,7 @@ class CloudLoader:
             find_neighbours: done once per cloud, when it is first needed, before any augmentation: give it only with
                 augmentations that leave its result as it is.
             heads: answers that the batches hold targets for (dataset.targets); with "door" among them samples without
-                one are allowed, and labelled `NO_STATE`.
+                one are allowed, and labelled `IGNORE_INDEX`.
             more: data sets whose samples follow, all of them.
 
         Raises:
@@ -151,7 +156,7 @@ def _load(
     points = dataset.clouds[indices, :num_points]
     centroids_m = centroids(points)
     check_states(dataset, sample_ids, heads)
-    labels = np.where(dataset.labels[indices] < len(DoorState), dataset.labels[indices], NO_STATE)
+    labels = np.where(dataset.labels[indices] < len(DoorState), dataset.labels[indices], IGNORE_INDEX)
     wanted = door_targets([dataset.rows[index] for index in indices], centroids_m) if heads else {}
     targets = {name: values for name, values in wanted.items() if name in heads}
     parts = dataset.parts_of(indices, num_points) if PARTS in heads else None

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from doorstate import __version__
-from doorstate.clouds.io import ReadOptions, read_cloud
+from doorstate._files import atomic_path, is_vacant, read_csv, write_csv, write_text
+from doorstate._jobs import Progress, Shard, default_workers, no_progress, piece_paths, run_pieces
 from doorstate.clouds.preparation import NUM_POINTS
 from doorstate.dataset.class_folders import labelled_rows
 from doorstate.dataset.layouts import find_layout
@@ -30,8 +31,7 @@ from doorstate.dataset.store import (
 )
 from doorstate.dataset.strata import distance_band, region
 from doorstate.errors import CameraError, CloudError, ConfigError, DatasetError
-from doorstate.files import atomic_path, is_vacant, read_csv, write_csv, write_text
-from doorstate.jobs import Progress, Shard, default_workers, no_progress, piece_paths, run_pieces
+from doorstate.io.readers import ReadOptions, read_cloud
 from doorstate.simulation.frames import depth_sha256, replay
 from doorstate.simulation.manifest import unflatten
 from doorstate.simulation.run import MANIFEST as SIMULATED_MANIFEST

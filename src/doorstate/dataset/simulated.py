@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from doorstate._jobs import Progress, no_progress
 from doorstate.dataset.prepare import (
     Preparation,
     PreparationSummary,
@@ -22,7 +23,6 @@ from doorstate.dataset.prepare import (
 from doorstate.dataset.sampled import sample_frame
 from doorstate.dataset.store import is_prepared
 from doorstate.errors import CloudError
-from doorstate.jobs import Progress, no_progress
 from doorstate.simulation.frames import Frame
 from doorstate.simulation.manifest import Row
 from doorstate.simulation.run import piece_names, simulate_dataset

@@ -27,8 +27,8 @@ from typing import Literal
 import numpy as np
 from scipy.spatial import cKDTree
 
+from doorstate._files import read_csv, write_csv
 from doorstate.errors import ConfigError, DatasetError
-from doorstate.files import read_csv, write_csv
 
 Role = Literal["train", "val", "test", "unused"]
 Row = Mapping[str, str]

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
+from doorstate._files import read_csv, write_text
+from doorstate._models import FrozenModel
 from doorstate.dataset.sampled import sample_frame
-from doorstate.errors import ConfigError, DatasetError, first_problem
-from doorstate.files import read_csv, write_text
-from doorstate.models import Frozen
+from doorstate.errors import ConfigError, DatasetError, first_validation_error
 from doorstate.simulation.frames import Frame, replay
 from doorstate.simulation.manifest import unflatten
 from doorstate.simulation.shading import shade
@@ -29,7 +29,7 @@ _KEPT_CLOUDS = 512  # of those that are not stored
 _T = TypeVar("_T")
 
 
-class DatasetDescription(Frozen):
+class DatasetDescription(FrozenModel):
     """What a prepared folder holds."""
 
     kind: Literal["simulated", "imported"]
@@ -212,7 +212,7 @@ def open_dataset(folder: Path) -> PreparedDataset:
         parts_path = folder / PARTS
         parts = np.load(parts_path, mmap_mode="r", allow_pickle=False) if parts_path.is_file() else None
     except ValidationError as error:
-        raise DatasetError(f"{path}: {first_problem(error)}") from error
+        raise DatasetError(f"{path}: {first_validation_error(error)}") from error
     except (OSError, ValueError, EOFError) as error:
         raise DatasetError(f"{folder}: damaged ({error}); delete it and prepare it again") from error
     rows = read_csv(folder / MANIFEST)

@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from doorstate.clouds.augment import AugmentationDraw
+from doorstate.clouds.augmentation import AugmentationDraw
 from doorstate.clouds.preparation import SCALE_M
 from doorstate.simulation.manifest import numbers
 from doorstate.types import DOOR, NO_DOOR, Part, Points
@@ -22,7 +22,7 @@ Targets = dict[str, NDArray[np.float32]]
 """By answer: "door" (M, 1) 1 or 0, "angle" (M, 1) radians, "hinge" (M, 1) 1 left and 0 right, "frame" (M, 3), "widths"
 (M, 2)."""
 
-NO_STATE = -100  # label of a sample without a door: torch's cross entropy passes it over
+IGNORE_INDEX = -100  # label of a sample without a door: torch's cross entropy passes it over
 _HINGE = {"left": 1.0, "right": 0.0}
 
 

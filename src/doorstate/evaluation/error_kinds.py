@@ -11,7 +11,7 @@ import numpy as np
 from doorstate.dataset.store import PreparedDataset
 from doorstate.evaluation.results import ComparisonResults
 from doorstate.evaluation.table import UNDEFINED, Table
-from doorstate.types import ANSWERS, STATES
+from doorstate.types import PREDICTED_LABELS, STATES
 
 _RANGES = {
     "opening angle, °": ("opening_angle_deg", 0),
@@ -26,7 +26,7 @@ def error_kinds_table(results: ComparisonResults, dataset: PreparedDataset) -> T
     for network in results.networks:
         errors = [error for error in results.error_rows if error.network == network]
         for state in STATES:
-            for predicted in ANSWERS:
+            for predicted in PREDICTED_LABELS:
                 kind = [e for e in errors if (e.state, e.predicted) == (state, predicted)]
                 if kind:
                     found = [dataset.rows[dataset.index_of(error.sample_id)] for error in kind]

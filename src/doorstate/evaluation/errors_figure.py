@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from doorstate.dataset.store import PreparedDataset
-from doorstate.evaluation.found_shapes import draw_shapes
+from doorstate.evaluation.detections import draw_detections
 from doorstate.evaluation.gallery import order_of_errors
 from doorstate.evaluation.results import ComparisonResults, ErrorRow
 from doorstate.evaluation.samples_figure import draw_cloud, part_legend
@@ -35,7 +35,7 @@ def surest_errors_figure(results: ComparisonResults, dataset: PreparedDataset) -
         for column, error in enumerate(errors):
             title = f"{STATE_WORDS[error.state]} as {STATE_WORDS[error.predicted]}, {error.confidence:.2f}"
             _draw(axes[2 * line][column], axes[2 * line + 1][column], dataset, error, title)
-            draw_shapes(axes[2 * line + 1][column], results.shapes(network, error.sample_id))
+            draw_detections(axes[2 * line + 1][column], results.shapes(network, error.sample_id))
     part_legend(figure, dataset, [dataset.index_of(e.sample_id) for _, errors in lines for e in errors])
     return figure
 

@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
+from doorstate._files import atomic_path
 from doorstate.dataset.store import PreparedDataset
 from doorstate.evaluation.calibration import reliability_figure
 from doorstate.evaluation.errors_figure import common_errors_figure, surest_errors_figure
@@ -27,7 +28,6 @@ from doorstate.evaluation.results import ComparisonResults, Run
 from doorstate.evaluation.samples_figure import samples_figure
 from doorstate.evaluation.score_tables import answers_given, f1_intervals, fold_f1, pooled_confusion
 from doorstate.evaluation.views import STATE_WORDS, graph_axes, outside_legend
-from doorstate.files import atomic_path
 from doorstate.types import STATES
 
 _DPI = 160

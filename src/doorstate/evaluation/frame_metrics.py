@@ -20,7 +20,7 @@ from doorstate.evaluation.metrics import (
     scores,
     wilson_interval,
 )
-from doorstate.types import ANSWERS, NO_ANSWER, STATES, Indices
+from doorstate.types import ABSTAINED, PREDICTED_LABELS, STATES, Indices
 
 _FEWEST_GROUPS = 5  # chosen: resamples of fewer are too much alike to say anything
 Metrics = dict[str, Any]
@@ -30,13 +30,13 @@ Metrics = dict[str, Any]
 class Said(NamedTuple):
     """An answer to one frame."""
 
-    answer: str  # of `ANSWERS`
+    answer: str  # of `PREDICTED_LABELS`
     probability: float  # of this answer; 0 of none
 
 
 def is_wrong(label: str, answer: str) -> bool:
     """Whether an answer is not the state, or is a state where there is none to tell."""
-    return answer != label if label in STATES else answer != NO_ANSWER
+    return answer != label if label in STATES else answer != ABSTAINED
 
 
 def measure(
@@ -64,7 +64,7 @@ def measure(
     most = counts.most_common(1)[0][0] if counts else STATES[0]
     methods = {}
     for method, answers in said.items():
-        given = np.array([ANSWERS.index(each.answer) for each in answers], dtype=np.int64)
+        given = np.array([PREDICTED_LABELS.index(each.answer) for each in answers], dtype=np.int64)
         methods[method] = {
             "all": _score(true, given[labelled], named),
             "by": {
@@ -108,7 +108,7 @@ def _score(true: Indices, given: Indices, groups: Sequence[str]) -> Metrics:
         states[state] = _share(right[of_state], [groups[int(each)] for each in np.flatnonzero(of_state)])
     return {
         **_share(right, groups),
-        "no_answer": int((given == ANSWERS.index(NO_ANSWER)).sum()),
+        "abstained": int((given == PREDICTED_LABELS.index(ABSTAINED)).sum()),
         "macro_f1": _defined(macro_f1),
         "macro_f1_interval": _bootstrapped(true, given, list(map(str, range(len(true))))),
         "macro_f1_interval_by_group": _bootstrapped(true, given, groups),
@@ -136,7 +136,7 @@ def _share(right: NDArray[np.bool_], groups: Sequence[str]) -> Metrics:
 
 
 def _without(answers: Sequence[Said]) -> Metrics:
-    given = [each for each in answers if each.answer != NO_ANSWER]
+    given = [each for each in answers if each.answer != ABSTAINED]
     counts = Counter(each.answer for each in given)
     sure = [each.probability for each in given]
     return {

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from doorstate.evaluation.frame_metrics import Metrics
 from doorstate.evaluation.table import UNDEFINED, Table, interval, number
-from doorstate.types import ANSWERS, STATES
+from doorstate.types import PREDICTED_LABELS, STATES
 
 NO_GROUP = "frame"
 
@@ -93,7 +93,7 @@ def _cells(score: Metrics, group: str) -> tuple[str, ...]:
         _number(score["macro_f1"]),
         _interval(score["macro_f1_interval"]),
         *(() if group == NO_GROUP else (_interval(score["macro_f1_interval_by_group"]),)),
-        str(score["no_answer"]),
+        str(score["abstained"]),
     )
 
 
@@ -120,7 +120,9 @@ def _confusion(metrics: Metrics) -> Table:
         for state, counts in zip(STATES, each["all"]["confusion"], strict=True)
         if sum(counts)
     ]
-    return Table("Answers by true state", ("method", "true state", *ANSWERS), tuple(rows), text_columns=2)
+    return Table(
+        "Answers by true state", ("method", "true state", *PREDICTED_LABELS), tuple(rows), text_columns=2
+    )
 
 
 def _without(metrics: Metrics) -> Table:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from doorstate.dataset.store import PreparedDataset
-from doorstate.evaluation.found_shapes import encode_shapes
+from doorstate.evaluation.detections import encode_detections
 from doorstate.evaluation.pages import data_uri, encode_cloud
 from doorstate.evaluation.results import ComparisonResults, ErrorRow
 from doorstate.evaluation.stratum_tables import is_undecidable
@@ -112,7 +112,7 @@ def _card(dataset: PreparedDataset, row: Mapping[str, str], answers: tuple[Error
 
 def _shapes(results: ComparisonResults, errors: list[ErrorRow]) -> dict[str, list[dict[str, Any]]]:
     found = {error.network: results.shapes(error.network, error.sample_id) for error in errors}
-    return {method: encode_shapes(shapes) for method, shapes in found.items() if shapes}
+    return {method: encode_detections(shapes) for method, shapes in found.items() if shapes}
 
 
 def _facts(row: Mapping[str, str]) -> list[str]:

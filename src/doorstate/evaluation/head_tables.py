@@ -15,7 +15,7 @@ from doorstate.evaluation.results import Answers, ComparisonResults
 from doorstate.evaluation.stratum_tables import rows_of
 from doorstate.evaluation.table import Table, number
 from doorstate.simulation.manifest import numbers
-from doorstate.types import NO_DOOR, STATES, SURE, Part
+from doorstate.types import DECISION_THRESHOLD, NO_DOOR, STATES, Part
 
 _ERRORS = {
     "door, AUROC": 4,
@@ -71,7 +71,7 @@ def answer_errors(given: Answers, dataset: PreparedDataset) -> dict[str, float]:
     hinge = np.array([row.get("hinge") or row.get("door.hinge", "") for row in manifest])
     said_left = given.columns.get("p_hinge_left", np.full(len(state), math.nan))
     hinge_right = np.where(
-        (hinge != "") & ~np.isnan(said_left), (said_left >= SURE) == (hinge == "left"), math.nan
+        (hinge != "") & ~np.isnan(said_left), (said_left >= DECISION_THRESHOLD) == (hinge == "left"), math.nan
     )
     place = np.hypot(off("door_x_m"), off("door_y_m"))
     found = (
@@ -104,7 +104,7 @@ def presence_table(results: ComparisonResults, dataset: PreparedDataset) -> Tabl
         manifest = rows_of(dataset, given)
         kinds = np.array([row.get("door_kind") or row.get("scene_kind", "") for row in manifest])
         doors = np.array([row["state"] != NO_DOOR for row in manifest])
-        said = given.columns["p_door"] >= SURE
+        said = given.columns["p_door"] >= DECISION_THRESHOLD
         for is_door, name in ((True, "yes"), (False, "no")):
             for kind in sorted(set(kinds[doors == is_door])):
                 chosen = (doors == is_door) & (kinds == kind)
@@ -124,7 +124,7 @@ def four_answers_table(results: ComparisonResults, dataset: PreparedDataset) -> 
     for method, given in _of_doors(results):
         state = np.array([row["state"] for row in rows_of(dataset, given)])
         right_state = results.pooled(method).right_by_sample
-        door = given.columns["p_door"] >= SURE
+        door = given.columns["p_door"] >= DECISION_THRESHOLD
         right = np.where(
             state == NO_DOOR, ~door, door & [right_state.get(name, False) for name in given.sample_ids]
         )

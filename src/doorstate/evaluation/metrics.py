@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.stats import binomtest, norm
 from sklearn import metrics as sklearn_metrics
 
-from doorstate.types import ANSWERS, STATES, Indices
+from doorstate.types import PREDICTED_LABELS, STATES, Indices
 
 Floats = NDArray[np.float64]
 Interval = tuple[float, float]
@@ -33,11 +33,13 @@ def confusion_matrix(true: Indices, predicted: Indices) -> Indices:
         predicted: (N,) labels, or 3 for no answer.
 
     Returns:
-        (3, 4) counts in the order of `STATES` and `ANSWERS`.
+        (3, 4) counts in the order of `STATES` and `PREDICTED_LABELS`.
     """
     if len(true) == 0:  # scikit-learn refuses an empty input
-        return np.zeros((len(STATES), len(ANSWERS)), dtype=np.int64)
-    counts: Indices = sklearn_metrics.confusion_matrix(true, predicted, labels=np.arange(len(ANSWERS)))
+        return np.zeros((len(STATES), len(PREDICTED_LABELS)), dtype=np.int64)
+    counts: Indices = sklearn_metrics.confusion_matrix(
+        true, predicted, labels=np.arange(len(PREDICTED_LABELS))
+    )
     return counts[: len(STATES)]
 
 
@@ -143,7 +145,7 @@ def bootstrap_f1(
         generator: source of the draws.
         resamples: number of bootstrap samples.
     """
-    states, answers = len(STATES), len(ANSWERS)
+    states, answers = len(STATES), len(PREDICTED_LABELS)
     if len(true) == 0:
         undefined = (float("nan"), float("nan"))
         return F1Intervals((undefined,) * states, undefined)

@@ -11,7 +11,7 @@ from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 from numpy.typing import NDArray
 from plotly.offline import get_plotlyjs
 
-from doorstate.evaluation.views import PART_COLORS, SHAPE_COLORS, VIEW_ELEVATION_RAD
+from doorstate.evaluation.views import DETECTION_COLORS, PART_COLORS, VIEW_ELEVATION_RAD
 from doorstate.types import Part, Points
 
 
@@ -32,7 +32,7 @@ def render_page(template: str, package: str = "doorstate.evaluation", **values: 
     )
     look = {
         "parts": [{"value": part, "name": part.name.lower(), "color": PART_COLORS[part]} for part in Part],
-        "shape_colors": SHAPE_COLORS,
+        "shape_colors": DETECTION_COLORS,
         "elevation": VIEW_ELEVATION_RAD,
     }
     return environment.get_template(template).render(

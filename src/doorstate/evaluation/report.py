@@ -10,7 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from doorstate._files import write_text
 from doorstate.dataset.store import PreparedDataset, open_dataset
+from doorstate.evaluation.caveats import PROTOCOLS, caveats
 from doorstate.evaluation.figures import (
     Drawing,
     draw_dataset,
@@ -20,18 +22,16 @@ from doorstate.evaluation.figures import (
 from doorstate.evaluation.gallery import build_gallery
 from doorstate.evaluation.join import load_joined
 from doorstate.evaluation.metrics import ratio
-from doorstate.evaluation.notes import PROTOCOLS, honest_notes
 from doorstate.evaluation.pages import data_uri, render_page
 from doorstate.evaluation.results import ComparisonResults
 from doorstate.evaluation.score_tables import answers_given, pooled_confusion
 from doorstate.evaluation.table import Table
 from doorstate.evaluation.tables import dataset_tables, save_tables, write_tables
-from doorstate.evaluation.views import SHAPE_COLORS, STATE_COLORS, STATE_WORDS
-from doorstate.files import write_text
+from doorstate.evaluation.views import DETECTION_COLORS, STATE_COLORS, STATE_WORDS
 from doorstate.types import STATES
 
 
-def write_everything(
+def write_report(
     comparison_folders: Sequence[Path],
     out_folder: Path,
     dataset_folder: Path | None = None,
@@ -103,7 +103,7 @@ def render_report(
         comparison=results.comparison,
         recipe=json.dumps(results.comparison.recipe, indent=2, default=str),
         protocol=PROTOCOLS.get(results.comparison.protocol, ""),
-        notes=honest_notes(results, dataset),
+        notes=caveats(results, dataset),
         facts=_facts(results, dataset),
         environment=_environment(results),
         tables=tables,
@@ -113,7 +113,7 @@ def render_report(
         words=STATE_WORDS,
         answers=answers_given(results),
         state_colors=STATE_COLORS,
-        shape_colors=SHAPE_COLORS,
+        shape_colors=DETECTION_COLORS,
         shape_names=sorted(
             {
                 s["name"]

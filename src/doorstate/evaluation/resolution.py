@@ -8,6 +8,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
+from doorstate._files import read_csv
 from doorstate.errors import RunError
 from doorstate.evaluation.figures import encode_figures, save_drawings
 from doorstate.evaluation.metrics import scores
@@ -16,7 +17,6 @@ from doorstate.evaluation.score_tables import pooled_confusion
 from doorstate.evaluation.table import Table, number
 from doorstate.evaluation.tables import save_tables
 from doorstate.evaluation.views import NETWORK_COLORS, graph_axes
-from doorstate.files import read_csv
 from doorstate.training.run_folder import AS_TRAINED, FINE_TUNED
 
 LATENCY = "latency.csv"

@@ -14,15 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import TypeAdapter, ValidationError
 
+from doorstate._files import read_csv
 from doorstate.dataset.splits import Role, read_splits
 from doorstate.dataset.store import MANIFEST
-from doorstate.errors import DatasetError, RunError, first_problem
-from doorstate.evaluation.found_shapes import Found, read_found
+from doorstate.errors import DatasetError, RunError, first_validation_error
+from doorstate.evaluation.detections import Detections, read_detections
 from doorstate.evaluation.metrics import Floats
-from doorstate.files import read_csv
-from doorstate.rules.base import Shape
+from doorstate.rules.base import Detection
 from doorstate.training.run_folder import RunFolder, read_json, run_of
-from doorstate.types import ANSWERS, NO_DOOR, STATES, Indices
+from doorstate.types import NO_DOOR, PREDICTED_LABELS, STATES, Indices
 
 PROBABILITY_COLUMNS = tuple(f"p_{state}" for state in STATES)
 
@@ -96,7 +96,7 @@ class Run:
     environment: Mapping[str, Any]
     validation: Predictions | None = None
     answers: Answers | None = None  # of further heads, to all test samples, those without a door too
-    found: Found = field(default_factory=dict)  # of a rule, where it was wrong
+    detections: Detections = field(default_factory=dict)  # of a rule, where it was wrong
 
     def metric(self, name: str) -> float:
         """A number of `metrics.json`, NaN where the run did not record it."""
@@ -172,9 +172,9 @@ class ComparisonResults:
             {name: np.concatenate([part.columns[name] for part in given]) for name in given[0].columns},
         )
 
-    def shapes(self, network: str, sample_id: str) -> tuple[Shape, ...]:
+    def shapes(self, network: str, sample_id: str) -> tuple[Detection, ...]:
         """What a rule found in a sample; nothing of a network, or where the answer was right."""
-        return tuple(shape for run in self.runs_of(network) for shape in run.found.get(sample_id, ()))
+        return tuple(shape for run in self.runs_of(network) for shape in run.detections.get(sample_id, ()))
 
     def role_counts(self, fold: int) -> Counter[str]:
         """Number of samples in each role of one fold."""
@@ -189,7 +189,7 @@ class ComparisonResults:
                 run.fold,
                 run.predictions.sample_ids[i],
                 STATES[run.predictions.true[i]],
-                ANSWERS[run.predictions.predicted[i]],
+                PREDICTED_LABELS[run.predictions.predicted[i]],
                 tuple(run.predictions.probabilities[i].tolist()),
             )
             for run in self.runs
@@ -237,7 +237,7 @@ def _read_comparison(path: Path) -> Comparison:
     try:
         return TypeAdapter(Comparison).validate_python(read_json(path))
     except ValidationError as error:
-        raise RunError(f"{path}: {first_problem(error)}; write the comparison again") from error
+        raise RunError(f"{path}: {first_validation_error(error)}; write the comparison again") from error
 
 
 def _find_dataset(comparison_folder: Path, dataset: str) -> Path:
@@ -263,17 +263,19 @@ def _read_run(folder: RunFolder, network: str, fold: int) -> Run:
         read_json(folder.environment) if folder.environment.exists() else {},
         _read_predictions(folder.validation, fold) if folder.validation.exists() else None,
         answers,
-        read_found(folder.found),
+        read_detections(folder.detections),
     )
 
 
 def _read_predictions(path: Path, fold: int) -> Predictions:
     rows = _read_columns(path, ("sample_id", "state", "predicted", *PROBABILITY_COLUMNS))
     named = [(row["state"], row["predicted"]) for row in rows]
-    unknown = {state for state, _ in named} - set(STATES) | {answer for _, answer in named} - set(ANSWERS)
+    unknown = {state for state, _ in named} - set(STATES) | {answer for _, answer in named} - set(
+        PREDICTED_LABELS
+    )
     if unknown:
         raise RunError(f"{path}: {sorted(unknown)[0]!r} is none of {', '.join(STATES)}; test this run again")
-    labels = np.array([[ANSWERS.index(name) for name in pair] for pair in named], dtype=np.int64)
+    labels = np.array([[PREDICTED_LABELS.index(name) for name in pair] for pair in named], dtype=np.int64)
     true, predicted = labels.reshape(-1, 2).T
     try:
         cells = [[float(row[column]) for column in PROBABILITY_COLUMNS] for row in rows]

@@ -22,7 +22,7 @@ from doorstate.evaluation.metrics import (
 from doorstate.evaluation.results import ComparisonResults
 from doorstate.evaluation.stratum_tables import rows_of
 from doorstate.evaluation.table import UNDEFINED, Table, interval, mean_deviation, number, p_value
-from doorstate.types import ANSWERS, STATES, Indices
+from doorstate.types import PREDICTED_LABELS, STATES, Indices
 
 
 def pooled_confusion(results: ComparisonResults, network: str) -> Indices:
@@ -34,7 +34,7 @@ def pooled_confusion(results: ComparisonResults, network: str) -> Indices:
 def answers_given(results: ComparisonResults) -> tuple[str, ...]:
     """Names of the columns of a confusion matrix: the states, and no answer if there is such a one."""
     silent = any((run.predictions.predicted >= len(STATES)).any() for run in results.runs)
-    return ANSWERS if silent else STATES
+    return PREDICTED_LABELS if silent else STATES
 
 
 def fold_f1(results: ComparisonResults, network: str) -> list[float]:

@@ -13,7 +13,7 @@ from doorstate.dataset.strata import BANDS, REGIONS
 from doorstate.evaluation.metrics import accuracy, confusion_matrix, ratio, scores
 from doorstate.evaluation.results import Answers, ComparisonResults, Predictions
 from doorstate.evaluation.table import UNDEFINED, Table, number
-from doorstate.types import ANSWERS, NO_DOOR, STATES, Indices
+from doorstate.types import NO_DOOR, PREDICTED_LABELS, STATES, Indices
 
 NO_STRATA = "This data set records no distance bands or angle regions."
 NO_TWINS = "This data set does not record which frames look the same in another state."
@@ -120,7 +120,7 @@ def _stratum_rows(
 
 def _stratum_confusions(predictions: Predictions, dataset: PreparedDataset) -> Indices:
     """Confusion matrices (6, 5, 3, 4) by region and band; the last of each is over all of them."""
-    states, answers = len(STATES), len(ANSWERS)
+    states, answers = len(STATES), len(PREDICTED_LABELS)
     cells = predictions.true * answers + predictions.predicted
     counts = _with_margins(_stratum_counts(rows_of(dataset, predictions), cells, states * answers))
     return counts.reshape(*counts.shape[:2], states, answers)  # (6, 5, 3, 4)

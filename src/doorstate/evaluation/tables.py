@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
+from doorstate._files import write_text
 from doorstate.dataset.store import PreparedDataset
 from doorstate.evaluation.calibration import calibration_table
 from doorstate.evaluation.error_kinds import error_kinds_table
@@ -23,7 +24,6 @@ from doorstate.evaluation.score_tables import (
 )
 from doorstate.evaluation.stratum_tables import decidable_table, samples_table, state_table, undecidable_table
 from doorstate.evaluation.table import UNDEFINED, Table, number
-from doorstate.files import write_text
 from doorstate.types import STATES
 
 _ERROR_COLUMNS = (

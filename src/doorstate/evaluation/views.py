@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.colors import Normalize, to_rgba_array
 from numpy.typing import NDArray
 
-from doorstate.types import NO_ANSWER, Part, Points
+from doorstate.types import ABSTAINED, Part, Points
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -28,7 +28,7 @@ REGION_COLORS = {
     "yellow": "#F0E442",
     "blue": "#0072B2",
 }
-STATE_WORDS = {"closed": "closed", "semi_open": "semi-open", "open": "open", NO_ANSWER: "no answer"}
+STATE_WORDS = {"closed": "closed", "semi_open": "semi-open", "open": "open", ABSTAINED: "no answer"}
 STATE_COLORS = {"closed": "#0072B2", "semi_open": "#E69F00", "open": "#CC79A7"}
 NETWORK_COLORS = {
     "pointnet": "#0072B2",
@@ -38,7 +38,7 @@ NETWORK_COLORS = {
     "point2sequence": "#E69F00",
 }
 # What rules find, over clouds in the colours of their parts.
-SHAPE_COLORS = {
+DETECTION_COLORS = {
     "wall": "#0072B2",
     "leaf": "#B3202C",
     "opening": "#00A651",

@@ -10,7 +10,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from doorstate.errors import CloudContentError, ConfigError
-from doorstate.networks.ops import at_least_float32
+from doorstate.networks.kernels.ops import at_least_float32
 
 Neighbourhoods = tuple[Tensor, ...]
 """Indices (B, ...) into a cloud's points that depend on coordinates alone."""

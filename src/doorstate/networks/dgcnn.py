@@ -10,9 +10,15 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from doorstate.networks.base import Encoding, Neighbourhoods, PointNetwork
+from doorstate.networks.kernels.ops import (
+    full_precision,
+    gather_rows,
+    max_over_points,
+    neighbour_max,
+    neighbour_sum,
+)
+from doorstate.networks.kernels.search import knn, spatial_order
 from doorstate.networks.layers import PointHead, RowBatchNorm, set_batchnorm
-from doorstate.networks.ops import full_precision, gather_rows, max_over_points, neighbour_max, neighbour_sum
-from doorstate.networks.search import knn, spatial_order
 
 _SLOPE = 0.2
 

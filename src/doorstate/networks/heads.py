@@ -17,8 +17,8 @@ from torch.nn import functional
 
 from doorstate.errors import ConfigError
 from doorstate.networks.base import Neighbourhoods, PointNetwork
+from doorstate.networks.kernels.ops import at_least_float32, full_precision
 from doorstate.networks.layers import Dense, glorot
-from doorstate.networks.ops import at_least_float32, full_precision
 from doorstate.types import PARTS, Part
 
 Targets = Mapping[str, Tensor]
@@ -126,7 +126,7 @@ STATE = "state"
 """Name of what the network's own head says."""
 
 
-def give_heads(network: PointNetwork, names: Sequence[str], num_parts: int = len(Part) - 1) -> None:
+def add_heads(network: PointNetwork, names: Sequence[str], num_parts: int = len(Part) - 1) -> None:
     """Add heads to a network; what it had stays as it is.
 
     Args:

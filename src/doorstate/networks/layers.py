@@ -11,8 +11,8 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from doorstate.networks.fused import linear_max, linear_norm_max, linear_relu, with_moments
-from doorstate.networks.ops import autocast_type, full_precision, gather_rows
+from doorstate.networks.kernels.fused import linear_max, linear_norm_max, linear_relu, with_moments
+from doorstate.networks.kernels.ops import autocast_type, full_precision, gather_rows
 
 _MANY_POINTS = 256  # from here on most rows have no maximum, and a gradient only of those that do is cheaper
 

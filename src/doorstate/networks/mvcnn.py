@@ -12,8 +12,8 @@ import torch
 from torch import Tensor, nn
 
 from doorstate.networks.base import Encoding, Neighbourhoods, PointNetwork
+from doorstate.networks.kernels.ops import full_precision
 from doorstate.networks.layers import classification_head
-from doorstate.networks.ops import full_precision
 
 # Azimuth and elevation of the cameras in degrees. Chosen: a depth camera sees the front of things only, so the
 # views lie on its side, spread until the leaf is seen edge-on from one of them, and one looks down.

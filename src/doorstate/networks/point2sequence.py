@@ -12,6 +12,8 @@ from torch.nn import functional
 
 from doorstate.errors import ConfigError
 from doorstate.networks.base import Encoding, Neighbourhoods, PointNetwork
+from doorstate.networks.kernels.ops import gather_rows
+from doorstate.networks.kernels.search import knn
 from doorstate.networks.layers import (
     Dense,
     PooledMLP,
@@ -20,8 +22,6 @@ from doorstate.networks.layers import (
     glorot,
     set_batchnorm,
 )
-from doorstate.networks.ops import gather_rows
-from doorstate.networks.search import knn
 
 NUM_CENTRES = 384
 WIDTH = 128

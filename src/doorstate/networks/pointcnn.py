@@ -14,9 +14,9 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from doorstate.networks.base import Encoding, Neighbourhoods, PointNetwork
+from doorstate.networks.kernels.ops import at_least_float32, full_precision, gather_rows, weigh_neighbours
+from doorstate.networks.kernels.search import knn
 from doorstate.networks.layers import PointLinear, RowBatchNorm, set_batchnorm
-from doorstate.networks.ops import at_least_float32, full_precision, gather_rows, weigh_neighbours
-from doorstate.networks.search import knn
 
 
 class Level(NamedTuple):

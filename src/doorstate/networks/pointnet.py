@@ -7,6 +7,7 @@ import torch
 from torch import Tensor, nn
 
 from doorstate.networks.base import Encoding, Neighbourhoods, PointNetwork
+from doorstate.networks.kernels.ops import at_least_float32, full_precision
 from doorstate.networks.layers import (
     Dense,
     DenseMax,
@@ -15,7 +16,6 @@ from doorstate.networks.layers import (
     classification_head,
     set_batchnorm,
 )
-from doorstate.networks.ops import at_least_float32, full_precision
 
 
 class TransformNet(nn.Module):

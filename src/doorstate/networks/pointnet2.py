@@ -11,6 +11,8 @@ from torch import Tensor, nn
 
 from doorstate.errors import ConfigError
 from doorstate.networks.base import Encoding, Neighbourhoods, PointNetwork
+from doorstate.networks.kernels.ops import full_precision, gather_rows
+from doorstate.networks.kernels.search import ball_query, knn
 from doorstate.networks.layers import (
     Dense,
     PooledMLP,
@@ -19,8 +21,6 @@ from doorstate.networks.layers import (
     glorot,
     set_batchnorm,
 )
-from doorstate.networks.ops import full_precision, gather_rows
-from doorstate.networks.search import ball_query, knn
 
 
 class Scale(NamedTuple):

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from doorstate.rules.base import Answer, Parameters, Rule, state_by_angle
+from doorstate.rules.base import Parameters, Rule, RuleResult, state_by_angle
 from doorstate.rules.plan_lines import Floats, angle_deg
 from doorstate.rules.planes import Plane, pieces, thin, upright_plane
 from doorstate.rules.walls import WallParameters, covered_m, nearby, off_floor, outline, wall_alone
@@ -42,17 +42,17 @@ class AngleBinsRule(Rule[AngleBinsParameters]):
     source: ClassVar[str] = "plain baseline: what robots do today"
     defaults: ClassVar[type[Parameters]] = AngleBinsParameters
 
-    def __call__(self, cloud: Points) -> Answer:
+    def __call__(self, cloud: Points) -> RuleResult:
         p = self.parameters
         points, measured_share = nearby(cloud, p.farthest_m)
         if measured_share < p.min_measured_share:
-            return Answer.none("too few pixels were measured")
+            return RuleResult.abstain("too few pixels were measured")
         if len(points) < p.min_leaf_points:
-            return Answer.none("too few points")
+            return RuleResult.abstain("too few points")
         points = thin(points, p.voxel_m)
         planes = self._planes(points[off_floor(points, p.wall.floor_margin_m)])
         if not planes:
-            return Answer.none("no vertical plane")
+            return RuleResult.abstain("no vertical plane")
         # A thin slanting cut through clutter is wide but full of holes, so what counts is the length that is covered.
         planes.sort(key=lambda each: -covered_m(each[0], each[1], p.wall.bin_m))
         wall, on_wall = planes[0]
@@ -64,7 +64,7 @@ class AngleBinsRule(Rule[AngleBinsParameters]):
                 angle = angle_deg(wall.normal, leaf.normal)
                 found = (outline("wall", wall, on_wall), outline("leaf", leaf, on_leaf))
                 state = state_by_angle(angle, p.closed_below_deg, p.open_above_deg)
-                return Answer(state, opening_angle_deg=angle, found=found)
+                return RuleResult(state, opening_angle_deg=angle, detections=found)
         return wall_alone(wall, points, p.wall)
 
     def _planes(self, points: Floats) -> list[tuple[Plane, Floats]]:

@@ -10,13 +10,13 @@ from typing import ClassVar, Generic, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from doorstate._models import FrozenModel
 from doorstate.clouds.preparation import is_measured
-from doorstate.models import Frozen
 from doorstate.types import DoorState, Points
 
 
 @dataclass(frozen=True, eq=False)
-class Shape:
+class Detection:
     """Something found in the cloud, to be drawn over it: one point is a corner, two an edge, more an outline."""
 
     name: str  # wall, leaf, opening, jamb, corner, ...
@@ -24,7 +24,7 @@ class Shape:
 
 
 @dataclass(frozen=True, eq=False)
-class Answer:
+class RuleResult:
     """A state, or a reason why there is none; and whatever else the rule can tell."""
 
     state: DoorState | None
@@ -32,15 +32,15 @@ class Answer:
     opening_angle_deg: float | None = None  # of the leaf against the wall: 0 is closed
     opening_width_m: float | None = None
     open_or_not: bool | None = None  # of rules that tell open doors from all others
-    found: tuple[Shape, ...] = field(default=())
+    detections: tuple[Detection, ...] = field(default=())
 
     @classmethod
-    def none(cls, reason: str, *found: Shape) -> Answer:
+    def abstain(cls, reason: str, *found: Detection) -> RuleResult:
         """No state, and why."""
-        return cls(None, reason, found=found)
+        return cls(None, reason, detections=found)
 
 
-class Parameters(Frozen):
+class Parameters(FrozenModel):
     """Base of every rule's parameters: frozen, named with units; a comment beside each says where it comes from."""
 
 
@@ -62,7 +62,7 @@ class Rule(ABC, Generic[P]):
         self.parameters: P = parameters or cast(P, self.defaults())
 
     @abstractmethod
-    def __call__(self, cloud: Points) -> Answer:
+    def __call__(self, cloud: Points) -> RuleResult:
         """State of the door in a cloud.
 
         Args:

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from doorstate.rules.base import Answer, Parameters, Rule, Shape
+from doorstate.rules.base import Detection, Parameters, Rule, RuleResult
 from doorstate.rules.planes import thin
 from doorstate.rules.walls import nearby
 from doorstate.types import DoorState, Points
@@ -41,13 +41,13 @@ class DepthRegionRule(Rule[DepthRegionParameters]):
     source: ClassVar[str] = "plain baseline: RoboCup@Home start doors"
     defaults: ClassVar[type[Parameters]] = DepthRegionParameters
 
-    def __call__(self, cloud: Points) -> Answer:
+    def __call__(self, cloud: Points) -> RuleResult:
         p = self.parameters
         points, measured_share = nearby(cloud, p.farthest_m)
         if measured_share < p.min_measured_share:
-            return Answer.none("too few pixels were measured")
+            return RuleResult.abstain("too few pixels were measured")
         if len(points) < p.min_points:
-            return Answer.none("too few points")
+            return RuleResult.abstain("too few points")
         points = thin(points, p.voxel_m)
         height_m = points[:, 2] - np.quantile(points[:, 2], 0.01)
         in_door = (height_m > p.floor_clearance_m) & (height_m < p.door_height_m)
@@ -65,9 +65,13 @@ class DepthRegionRule(Rule[DepthRegionParameters]):
             elif (floor & (strip == number)).sum() >= p.min_points:
                 free += 1
         if blocked + free < p.strips:
-            return Answer.none(f"{p.strips - blocked - free} of {p.strips} strips ahead were not measured")
+            return RuleResult.abstain(
+                f"{p.strips - blocked - free} of {p.strips} strips ahead were not measured"
+            )
         if blocked == 0:
-            return Answer(DoorState.OPEN)
+            return RuleResult(DoorState.OPEN)
         state = DoorState.CLOSED if free == 0 else DoorState.SEMI_OPEN
         half, x = p.lane_width_m / 2, float(np.median(surface_m))
-        return Answer(state, found=(Shape("surface", np.array([[x, half, 0.0], [x, -half, 0.0]])),))
+        return RuleResult(
+            state, detections=(Detection("surface", np.array([[x, half, 0.0], [x, -half, 0.0]])),)
+        )

@@ -18,7 +18,7 @@ from pydantic import Field
 from scipy.spatial import cKDTree
 
 from doorstate.clouds.preparation import is_measured
-from doorstate.rules.base import Answer, Parameters, Rule, Shape
+from doorstate.rules.base import Detection, Parameters, Rule, RuleResult
 from doorstate.rules.plan_lines import Flags, Floats, Line, strongest_line
 from doorstate.rules.planes import thin
 from doorstate.types import DoorState, Indices, Points
@@ -88,20 +88,20 @@ class OpenDoorRule(Rule[OpenDoorParameters]):
     name = "open_door"
     source = "Kaleci & Turgut 2020 (a reconstruction from what is known, not the authors' code)"
 
-    def __call__(self, cloud: Points) -> Answer:
+    def __call__(self, cloud: Points) -> RuleResult:
         if cloud.ndim != 3:
-            return Answer.none(
+            return RuleResult.abstain(
                 "needs an organized cloud (H, W, 3): an opening is a run of unmeasured readings"
             )
         view = self._view(cloud)
         if not len(view.points):
-            return Answer.none("nothing was measured")
+            return RuleResult.abstain("nothing was measured")
         for edges in self._chains(view, self._runs(view)):
             ends = view.points[edges.left], view.points[edges.right]
             corners = self._corners(view, edges) if self._is_pair(ends) else None
             if corners is not None:
                 return _opened(ends, corners)
-        return Answer(None, _NOT_OPEN, open_or_not=False)
+        return RuleResult(None, _NOT_OPEN, open_or_not=False)
 
     def _view(self, cloud: Points) -> _View:
         flat = np.asarray(cloud).reshape(-1, 3)
@@ -235,19 +235,19 @@ def _beyond_m(points: Floats, left: Floats, right: Floats) -> Floats:
     return beyond
 
 
-def _opened(ends: tuple[Floats, Floats], corners: Floats) -> Answer:
+def _opened(ends: tuple[Floats, Floats], corners: Floats) -> RuleResult:
     low_m = max(edge[:, 2].min() for edge in ends)
     high_m = min(edge[:, 2].max() for edge in ends)
     left, right = corners
     outline = np.array([[*left, low_m], [*left, high_m], [*right, high_m], [*right, low_m]])
     edges = [np.array([[*np.median(edge[:, :2], axis=0), z] for z in (low_m, high_m)]) for edge in ends]
-    return Answer(
+    return RuleResult(
         DoorState.OPEN,
         opening_width_m=float(np.hypot(*(left - right))),
         open_or_not=True,
-        found=(
-            Shape("opening", outline),
-            *(Shape("edge", edge) for edge in edges),
-            *(Shape("corner", corner[None]) for corner in outline),
+        detections=(
+            Detection("opening", outline),
+            *(Detection("edge", edge) for edge in edges),
+            *(Detection("corner", corner[None]) for corner in outline),
         ),
     )

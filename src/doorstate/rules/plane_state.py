@@ -8,7 +8,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from doorstate.rules.base import Answer, Parameters, Rule, state_by_angle
+from doorstate.rules.base import Parameters, Rule, RuleResult, state_by_angle
 from doorstate.rules.plan_lines import Floats, angle_deg
 from doorstate.rules.planes import Plane, normals, pieces, thin, upright_plane
 from doorstate.rules.walls import WallParameters, covered_m, nearby, outline, wall_alone
@@ -78,15 +78,15 @@ class PlaneStateRule(Rule[PlaneStateParameters]):
     source: ClassVar[str] = "Rusu et al. 2009"
     defaults: ClassVar[type[Parameters]] = PlaneStateParameters
 
-    def __call__(self, cloud: Points) -> Answer:
+    def __call__(self, cloud: Points) -> RuleResult:
         p = self.parameters
         points, _ = nearby(cloud, p.farthest_m)
         if len(points) < p.min_points:
-            return Answer.none("too few points")
+            return RuleResult.abstain("too few points")
         points = thin(points, p.voxel_m)
         surfaces = self._surfaces(points)
         if not surfaces:
-            return Answer.none("no upright plane")
+            return RuleResult.abstain("no upright plane")
         bearing = np.degrees(np.arctan2(points[:, 1], points[:, 0]))
         view = (bearing.min() + p.view_margin_deg, bearing.max() - p.view_margin_deg)
         leaves = [(number, leaf) for number, each in enumerate(surfaces) if (leaf := self._rectangle(each))]
@@ -100,11 +100,11 @@ class PlaneStateRule(Rule[PlaneStateParameters]):
             widest = max(surfaces, key=lambda each: covered_m(each.plane, each.points, p.wall.bin_m))
             return wall_alone(widest.plane, points, p.wall)
         best = max(pairs, key=lambda pair: (pair.whole, pair.wall_m))
-        return Answer(
+        return RuleResult(
             state_by_angle(best.angle_deg, p.closed_below_deg, p.open_above_deg),
             opening_angle_deg=best.angle_deg,
             opening_width_m=best.opening_width_m,
-            found=(outline("wall", *best.wall), outline("leaf", *best.leaf)),
+            detections=(outline("wall", *best.wall), outline("leaf", *best.leaf)),
         )
 
     def _surfaces(self, points: Floats) -> list[_Surface]:

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from doorstate.rules.base import Answer, Parameters, Rule, Shape, measured
+from doorstate.rules.base import Detection, Parameters, Rule, RuleResult, measured
 from doorstate.rules.plan_lines import Flags, Floats, Line, fit_line, strongest_line
 from doorstate.rules.planes import grid, thin
 from doorstate.types import DoorState, Points
@@ -99,19 +99,21 @@ class WallLeafAngleRule(Rule[WallLeafAngleParameters]):
         "Ning et al. 2023, Quintana et al. 2018 (a reconstruction from what is known, not the authors' code)"
     )
 
-    def __call__(self, cloud: Points) -> Answer:
+    def __call__(self, cloud: Points) -> RuleResult:
         if cloud.ndim == 3:
             cloud = cloud[:: max(1, len(cloud) // _MAX_ROWS)]
         points = measured(cloud)
         points = points[(np.abs(points) < self.parameters.reach_m).all(axis=1)]
         points = points[points[:, 2] <= self.parameters.slice_top_m]
         if len(points) < _FEWEST_POINTS:
-            return Answer.none(f"too few points: {len(points)} of use, at least {_FEWEST_POINTS} are needed")
+            return RuleResult.abstain(
+                f"too few points: {len(points)} of use, at least {_FEWEST_POINTS} are needed"
+            )
         points = thin(points, self.parameters.voxel_m)
         plan = self._plan(points)
         walls = [self._wall(line, plan, points) for line in self._walls(plan, points)]
         if not walls:
-            return Answer.none("no wall: no upright plane extends farther than a door is wide")
+            return RuleResult.abstain("no wall: no upright plane extends farther than a door is wide")
         answers = [self._answer(wall, plan, points) for wall in walls]
         # A corridor has more walls than one: that with a leaf or an opening is the door's.
         ajar = (answer for answer in answers if answer.state in (DoorState.SEMI_OPEN, DoorState.OPEN))
@@ -182,11 +184,11 @@ class WallLeafAngleRule(Rule[WallLeafAngleParameters]):
         seen[column[in_wall & (column >= 0) & (column < len(seen))]] = _OCCUPIED
         return _Wall(line, places_m, seen)
 
-    def _answer(self, wall: _Wall, plan: _Plan, points: Floats) -> Answer:
+    def _answer(self, wall: _Wall, plan: _Plan, points: Floats) -> RuleResult:
         """What the columns of one wall, and the leaf that stands off it, say."""
         ends_m = wall.places_m[wall.seen == _OCCUPIED][[0, -1]]
         first, last = (wall.line.at(float(end)) for end in ends_m)
-        outline = Shape("wall", _upright(first, last, points))
+        outline = Detection("wall", _upright(first, last, points))
         gaps = self._gaps(wall)
         opening = next((gap for gap in gaps if self._is_opening(wall, gap)), None)
         leaf = self._leaf(wall, plan, points)
@@ -195,12 +197,12 @@ class WallLeafAngleRule(Rule[WallLeafAngleParameters]):
         if leaf is not None:
             return self._of_leaf(wall, leaf, points, outline)
         if opening is not None:
-            shape = Shape("opening", _upright(wall.line.at(opening[0]), wall.line.at(opening[1]), points))
-            return Answer(
+            shape = Detection("opening", _upright(wall.line.at(opening[0]), wall.line.at(opening[1]), points))
+            return RuleResult(
                 DoorState.OPEN,
                 opening_width_m=opening[1] - opening[0],
                 open_or_not=True,
-                found=(outline, shape),
+                detections=(outline, shape),
             )
         ends = [ends_m[0], *np.ravel(gaps), ends_m[-1]]
         unbroken_m = max(end - start for start, end in zip(ends[::2], ends[1::2], strict=True))
@@ -208,12 +210,16 @@ class WallLeafAngleRule(Rule[WallLeafAngleParameters]):
         voids = [self._void_m(wall, gap) for gap in (*gaps, *beyond)]
         whole = max(voids) < self.parameters.opening_width_m[0] / 2
         if whole and unbroken_m >= self.parameters.wall_extent_m:
-            return Answer(DoorState.CLOSED, opening_angle_deg=0.0, open_or_not=False, found=(outline,))
+            return RuleResult(
+                DoorState.CLOSED, opening_angle_deg=0.0, open_or_not=False, detections=(outline,)
+            )
         if whole:
-            return Answer.none(
+            return RuleResult.abstain(
                 "one plane only, and too little of it to call it a wall with a closed door", outline
             )
-        return Answer.none("the wall is broken, but no door-sized opening and no leaf is seen", outline)
+        return RuleResult.abstain(
+            "the wall is broken, but no door-sized opening and no leaf is seen", outline
+        )
 
     def _gaps(self, wall: _Wall) -> list[tuple[float, float]]:
         """Between which places of the wall no column is occupied; single columns do not count."""
@@ -299,26 +305,26 @@ class WallLeafAngleRule(Rule[WallLeafAngleParameters]):
                 return _Leaf(hinge, tip, _opened_deg(tip - hinge, closing * wall.line.direction), closing)
         return None
 
-    def _of_leaf(self, wall: _Wall, leaf: _Leaf, points: Floats, outline: Shape) -> Answer:
+    def _of_leaf(self, wall: _Wall, leaf: _Leaf, points: Floats, outline: Detection) -> RuleResult:
         chosen = self.parameters
         low_m, high_m = chosen.opening_width_m
         hinge_m = float(wall.line.along_m(leaf.hinge))
         occupied_m = leaf.closing * (wall.places_m[wall.seen == _OCCUPIED] - hinge_m) - chosen.cell_m / 2
         strike_m = occupied_m[occupied_m >= low_m].min(initial=np.inf)
         width_m = float(strike_m) if strike_m <= high_m else None
-        shapes = [outline, Shape("leaf", _upright(leaf.hinge, leaf.tip, points))]
+        shapes = [outline, Detection("leaf", _upright(leaf.hinge, leaf.tip, points))]
         if width_m is not None:
             strike = leaf.hinge + leaf.closing * width_m * wall.line.direction
-            shapes.append(Shape("opening", _upright(leaf.hinge, strike, points)))
+            shapes.append(Detection("opening", _upright(leaf.hinge, strike, points)))
         state = DoorState.SEMI_OPEN if leaf.angle_deg < chosen.open_from_deg else DoorState.OPEN
         if leaf.angle_deg < chosen.closed_below_deg:
             state = DoorState.CLOSED
-        return Answer(
+        return RuleResult(
             state,
             opening_angle_deg=leaf.angle_deg,
             opening_width_m=width_m,
             open_or_not=state is DoorState.OPEN,
-            found=tuple(shapes),
+            detections=tuple(shapes),
         )
 
 

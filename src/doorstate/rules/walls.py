@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from doorstate.rules.base import Answer, Parameters, Shape, measured
+from doorstate.rules.base import Detection, Parameters, RuleResult, measured
 from doorstate.rules.plan_lines import Flags, Floats
 from doorstate.rules.planes import Plane
 from doorstate.types import DoorState, Points
@@ -31,7 +31,7 @@ class WallParameters(Parameters):
     middle_deg: float = 15.0  # to either side; chosen: half of the narrowest usual view (60 degrees)
 
 
-def wall_alone(wall: Plane, points: Floats, parameters: WallParameters) -> Answer:
+def wall_alone(wall: Plane, points: Floats, parameters: WallParameters) -> RuleResult:
     """State of a wall in which no leaf was found.
 
     Open where it has a door-wide void between two stretches of wall, something was measured through it, and nothing
@@ -50,7 +50,7 @@ def wall_alone(wall: Plane, points: Floats, parameters: WallParameters) -> Answe
     off_ground = off_floor(points, p.floor_margin_m)
     on_wall = points[below_lintel & off_ground & (np.abs(behind_m) <= p.threshold_m)]
     if len(on_wall) == 0:
-        return Answer.none("no wall at the camera's height")
+        return RuleResult.abstain("no wall at the camera's height")
     shape = outline("wall", wall, on_wall)
     start = float((on_wall @ along).min())
     solid = _filled(on_wall @ along - start, p.bin_m)
@@ -65,21 +65,23 @@ def wall_alone(wall: Plane, points: Floats, parameters: WallParameters) -> Answe
         width_m = float(first - last - 1) * p.bin_m
         fits = p.opening_width_m[0] <= width_m <= p.opening_width_m[1]
         if fits and before[last : first + 1].any():
-            return Answer.none("something stands before the opening", shape)
+            return RuleResult.abstain("something stands before the opening", shape)
         if fits and seen[last + 1 : first].mean() >= p.seen_through_share:
             edges = [start + (last + 1) * p.bin_m, start + first * p.bin_m]
-            opening = Shape(
+            opening = Detection(
                 "opening", np.stack([wall.normal * wall.offset_m + along * edge for edge in edges])
             )
-            return Answer(DoorState.OPEN, opening_width_m=width_m, found=(shape, opening))
+            return RuleResult(DoorState.OPEN, opening_width_m=width_m, detections=(shape, opening))
     places = wall.normal * wall.offset_m + along * (start + (covered[:, None] + 0.5) * p.bin_m)
     ahead = np.abs(np.arctan2(places[:, 1], places[:, 0])) <= math.radians(p.middle_deg)
     for run in np.split(
         np.arange(len(covered)), np.flatnonzero(np.diff(covered) * p.bin_m > p.largest_hole_m) + 1
     ):
         if ahead[run].any() and len(run) * p.bin_m >= p.unbroken_m:
-            return Answer(DoorState.CLOSED, opening_angle_deg=0.0, found=(shape,))
-    return Answer.none("one plane, neither unbroken in the middle nor with a void to see through", shape)
+            return RuleResult(DoorState.CLOSED, opening_angle_deg=0.0, detections=(shape,))
+    return RuleResult.abstain(
+        "one plane, neither unbroken in the middle nor with a void to see through", shape
+    )
 
 
 def nearby(cloud: Points, farthest_m: float) -> tuple[Floats, float]:
@@ -106,14 +108,14 @@ def covered_m(plane: Plane, on_plane: Floats, bin_m: float) -> float:
     return float(_filled(position - position.min(), bin_m).sum()) * bin_m
 
 
-def outline(name: str, plane: Plane, on_plane: Floats) -> Shape:
+def outline(name: str, plane: Plane, on_plane: Floats) -> Detection:
     """Upright rectangle (4 corners) around (N, 3) points of a vertical plane."""
     along = _along(plane)
     left, right = np.quantile(on_plane @ along, (0.01, 0.99))
     foot = plane.normal * plane.offset_m
     low, high = on_plane[:, 2].min(), on_plane[:, 2].max()
     ends = ((left, low), (right, low), (right, high), (left, high))
-    return Shape(name, np.array([foot + along * side + [0.0, 0.0, height] for side, height in ends]))
+    return Detection(name, np.array([foot + along * side + [0.0, 0.0, height] for side, height in ends]))
 
 
 def _along(plane: Plane) -> Floats:

@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from typing import Literal
 
-from doorstate.models import Frozen
+from doorstate._models import FrozenModel
 from doorstate.simulation.draws import Draws
 from doorstate.simulation.plan import collide, place
 from doorstate.simulation.rooms import Space
@@ -30,7 +30,7 @@ _LEG_M, _TOP_M = 0.04, 0.04
 _TRIES_AN_ITEM = 10
 
 
-class Item(Frozen):
+class Item(FrozenModel):
     """One thing, where it stands in the door frame, and how large it is."""
 
     kind: ItemKind

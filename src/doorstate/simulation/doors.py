@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import Literal
 
-from doorstate.models import Frozen
+from doorstate._models import FrozenModel
 from doorstate.simulation.handles import Handle, handle_boxes
 from doorstate.simulation.plan import collide, distance_m, mirror, place
 from doorstate.simulation.scene import Box, Door, frame_boxes, wall_boxes
@@ -51,7 +51,7 @@ class VariedDoor(Door):
         return self.kind == "sliding"
 
 
-class Opening(Frozen):
+class Opening(FrozenModel):
     """How far a door is open: its active and passive leaves' angles or, if it slides, the share of its width."""
 
     angle_deg: float = 0.0

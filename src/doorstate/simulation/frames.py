@@ -11,8 +11,8 @@ from typing import Any, NamedTuple, Protocol, Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from doorstate.clouds.camera import Intrinsics
-from doorstate.clouds.depth import depth_to_points
+from doorstate.io.camera import Intrinsics
+from doorstate.io.depth import depth_to_points
 from doorstate.simulation.noise.models import apply, find_sensor
 from doorstate.simulation.noise.streams import sample_seed
 from doorstate.simulation.scene import Box

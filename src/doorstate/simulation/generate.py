@@ -9,8 +9,8 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import ConfigDict, Field, SerializerFunctionWrapHandler, model_serializer
 
+from doorstate._models import FrozenModel
 from doorstate.errors import ConfigError
-from doorstate.models import Frozen
 from doorstate.simulation.door_draws import ANGLES_DEG
 from doorstate.simulation.frames import Frame, door_place, simulate
 from doorstate.simulation.placement import draw_heading_rad, half_ring, reduced_ring
@@ -21,7 +21,7 @@ from doorstate.types import DoorState
 _State = Literal["closed", "semi_open", "open"]
 
 
-class Preset(Frozen):
+class Preset(FrozenModel):
     """What a data set draws its scenes from; opening angles in degrees, one range per state."""
 
     name: str
@@ -54,7 +54,7 @@ PRESETS = {
 }
 
 
-class SampleRow(Frozen):
+class SampleRow(FrozenModel):
     """One line of the manifest; scene and camera columns rebuild the frame, the others describe it.
 
     Poses are in the door frame (simulation.scene) but for `door_*`, which is the door frame in the sensor frame.
@@ -89,7 +89,7 @@ class SampleRow(Frozen):
     sensor: str = "none"
 
     @model_serializer(mode="wrap")
-    def _without_what_is_not_given(self, fields: SerializerFunctionWrapHandler) -> dict[str, Any]:
+    def _omit_defaults(self, fields: SerializerFunctionWrapHandler) -> dict[str, Any]:
         # Manifests without a sensor have no column for one.
         return {name: value for name, value in fields(self).items() if (name, value) != ("sensor", "none")}
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from doorstate.models import Frozen
+from doorstate._models import FrozenModel
 from doorstate.simulation.draws import Draws
 from doorstate.simulation.scene import Box
 from doorstate.types import Part
@@ -16,7 +16,7 @@ _KNOB_M = 0.055
 _SHARES: dict[Literal["lever", "knob", "bar"], float] = {"lever": 0.6, "knob": 0.2, "bar": 0.2}
 
 
-class Handle(Frozen):
+class Handle(FrozenModel):
     """A handle; `length_m` is that of a lever's or bar's grip."""
 
     kind: Literal["lever", "knob", "bar"]

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from doorstate.errors import DatasetError, first_problem
+from doorstate.errors import DatasetError, first_validation_error
 from doorstate.simulation.generate import SampleRow
 from doorstate.simulation.scene_rows import SceneRow
 
@@ -49,7 +49,7 @@ def unflatten(columns: Mapping[str, str]) -> Row:
         return model.model_validate(nested)
     except ValidationError as error:
         line = columns.get("sample_id", "?")
-        raise DatasetError(f"manifest line {line}, column {first_problem(error)}") from error
+        raise DatasetError(f"manifest line {line}, column {first_validation_error(error)}") from error
 
 
 def numbers(rows: Sequence[Mapping[str, str]], *names: str) -> NDArray[np.float64]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import Literal, get_args
 
-from doorstate.models import Frozen
+from doorstate._models import FrozenModel
 from doorstate.simulation.draws import Draws
 from doorstate.simulation.scene import Box
 from doorstate.types import Part
@@ -19,7 +19,7 @@ _FRONT_M, _GAP_M, _PLINTH_M, _KNOB_M = 0.018, 0.003, 0.08, 0.025
 _CASEMENT_M, _PANE_M = 0.06, 0.02
 
 
-class Feature(Frozen):
+class Feature(FrozenModel):
     """What is in, or before, a wall instead of a door; its middle is the origin of the door frame."""
 
     kind: FeatureKind

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from doorstate.models import Frozen
+from doorstate._models import FrozenModel
 from doorstate.simulation.draws import Draws
 from doorstate.simulation.scene import Box
 from doorstate.types import Part
@@ -14,7 +14,7 @@ _BESIDE_M = 0.15  # from what is in the wall to a side wall, at least
 _AROUND_ROBOT_M = 0.45
 
 
-class Space(Frozen):
+class Space(FrozenModel):
     """Distances from the middle of the door (or of what is there instead) to the inner faces; None is open."""
 
     left_m: float | None = None

@@ -17,10 +17,10 @@ import numpy as np
 from PIL import Image
 from pydantic import TypeAdapter, ValidationError
 
-from doorstate.clouds.pcd import write_pcd
-from doorstate.errors import ConfigError, DatasetError, first_problem
-from doorstate.files import atomic_path, is_vacant, read_csv, write_csv, write_text
-from doorstate.jobs import Progress, Shard, default_workers, no_progress, piece_paths, run_pieces
+from doorstate._files import atomic_path, is_vacant, read_csv, write_csv, write_text
+from doorstate._jobs import Progress, Shard, default_workers, no_progress, piece_paths, run_pieces
+from doorstate.errors import ConfigError, DatasetError, first_validation_error
+from doorstate.io.pcd import write_pcd
 from doorstate.simulation.frames import Frame
 from doorstate.simulation.manifest import Row, flatten
 from doorstate.simulation.settings import RawKind, Settings
@@ -112,7 +112,7 @@ def read_settings(folder: Path) -> Settings:
     except (OSError, UnicodeDecodeError) as error:
         raise DatasetError(f"{folder}: holds no {_SETTINGS}; make one with 'doorstate simulate'") from error
     except ValidationError as error:
-        raise DatasetError(f"{path}: {first_problem(error)}") from error
+        raise DatasetError(f"{path}: {first_validation_error(error)}") from error
 
 
 def piece_names(settings: Settings) -> list[str]:

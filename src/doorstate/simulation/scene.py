@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import Literal, NamedTuple
 
-from doorstate.models import Frozen
+from doorstate._models import FrozenModel
 from doorstate.types import Part
 
 Hinge = Literal["left", "right"]
@@ -30,7 +30,7 @@ class Box(NamedTuple):
     material: Material = "matte"
 
 
-class Door(Frozen):
+class Door(FrozenModel):
     """A single hinged door and the wall around it; sizes are those of SIMULATION section 4, all assumed.
 
     The authors state none of them. Opening 0.90 x 2.10 m, wall 0.15 m and leaf 0.04 m are usual in Turkey.

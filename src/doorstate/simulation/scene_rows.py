@@ -10,7 +10,7 @@ from typing import Literal
 
 from pydantic import ConfigDict, field_serializer, field_validator
 
-from doorstate.models import Frozen
+from doorstate._models import FrozenModel
 from doorstate.simulation.door_draws import state_of
 from doorstate.simulation.doors import Opening, passable_width_m
 from doorstate.simulation.draws import Draws
@@ -37,7 +37,7 @@ _DRAWS: dict[PresetName, Callable[[Draws], DrawnScene]] = {
 }
 
 
-class ScenePreset(Frozen):
+class ScenePreset(FrozenModel):
     """What a data set of many scenes draws; the ranges are in the data card."""
 
     name: PresetName
@@ -47,7 +47,7 @@ class ScenePreset(Frozen):
 SCENE_PRESETS = {name: ScenePreset(name=name) for name in _DRAWS}
 
 
-class SceneRow(Frozen):
+class SceneRow(FrozenModel):
     """One line of the manifest of a preset of many scenes.
 
     `scene`, the opening, camera, sensor, seed and name rebuild the frame; the others describe it. Poses are in the door

@@ -7,7 +7,7 @@ from typing import Self
 
 from pydantic import model_validator
 
-from doorstate.models import Frozen
+from doorstate._models import FrozenModel
 from doorstate.simulation.clutter import Item, item_boxes
 from doorstate.simulation.doors import Opening, VariedDoor, door_boxes
 from doorstate.simulation.no_door import Feature, feature_boxes
@@ -15,7 +15,7 @@ from doorstate.simulation.rooms import Space, ceiling_box, space_boxes
 from doorstate.simulation.scene import Box, floor_box
 
 
-class Scene(Frozen):
+class Scene(FrozenModel):
     """Everything but the camera and how far the door is open."""
 
     door: VariedDoor | None = None

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import SerializerFunctionWrapHandler, model_serializer
 
-from doorstate.clouds.camera import Intrinsics
-from doorstate.models import Frozen
+from doorstate._models import FrozenModel
+from doorstate.io.camera import Intrinsics
 from doorstate.simulation.scene import Box, Material
 from doorstate.types import DepthImage, Part
 
@@ -31,7 +31,7 @@ _EDGES = np.array(
 )
 
 
-class DepthCamera(Frozen):
+class DepthCamera(FrozenModel):
     """A pinhole depth camera; the defaults are the ASUS Xtion Pro as Gazebo's `openni_kinect` plugin simulates it.
 
     Image 640x480, 60 degrees, valid strictly between 0.4 and 5.0 m (SIMULATION section 1.2). Pixels are square; the
@@ -56,7 +56,7 @@ class DepthCamera(Frozen):
         )
 
     @model_serializer(mode="wrap")
-    def _without_what_is_not_given(self, fields: SerializerFunctionWrapHandler) -> dict[str, float]:
+    def _omit_defaults(self, fields: SerializerFunctionWrapHandler) -> dict[str, float]:
         # Manifests have no columns for what ordinary cameras do not have.
         return {name: value for name, value in fields(self).items() if value is not None}
 

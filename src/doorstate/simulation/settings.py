@@ -8,8 +8,8 @@ from typing import Literal
 
 from pydantic import Field
 
+from doorstate._models import FrozenModel
 from doorstate.errors import ConfigError
-from doorstate.models import Frozen
 from doorstate.simulation.frames import Frame
 from doorstate.simulation.generate import PRESETS, Preset, pose_indices, simulate_pose
 from doorstate.simulation.manifest import Row
@@ -21,7 +21,7 @@ RAW_KINDS: tuple[RawKind, ...] = ("pcd", "depth", "image")
 DEFAULT_SCENES = 1000
 
 
-class SimulationSettings(Frozen):
+class SimulationSettings(FrozenModel):
     """One door, seen from the half-ring of poses or some of it."""
 
     preset: Preset
@@ -39,7 +39,7 @@ class SimulationSettings(Frozen):
         return simulate_pose(self.preset, self.seed, index, self.sensor)
 
 
-class SceneSettings(Frozen):
+class SceneSettings(FrozenModel):
     """Many scenes, each seen from one pose."""
 
     preset: ScenePreset

@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from doorstate.clouds.camera import Intrinsics
-from doorstate.clouds.depth import depth_to_points
+from doorstate.io.camera import Intrinsics
+from doorstate.io.depth import depth_to_points
 from doorstate.simulation.sensor import Render
 from doorstate.types import Part
 

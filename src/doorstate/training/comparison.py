@@ -10,6 +10,8 @@ from typing import Any, NamedTuple, TypeVar
 
 from pydantic import Field, ValidationError
 
+from doorstate._jobs import Progress, default_workers, no_progress, run_pieces
+from doorstate._models import FrozenModel
 from doorstate.clouds.preparation import NUM_POINTS
 from doorstate.dataset.join import check_thinned_alike
 from doorstate.dataset.loader import CloudLoader, check_states
@@ -25,11 +27,9 @@ from doorstate.dataset.splits import (
     write_splits,
 )
 from doorstate.dataset.store import PreparedDataset, open_dataset
-from doorstate.errors import ConfigError, RunError, first_problem
-from doorstate.jobs import Progress, default_workers, no_progress, run_pieces
-from doorstate.models import Frozen
+from doorstate.errors import ConfigError, RunError, first_validation_error
 from doorstate.networks import create_network, list_networks, network_class
-from doorstate.networks.heads import STATE, give_heads
+from doorstate.networks.heads import STATE, add_heads
 from doorstate.rules import create_rule
 from doorstate.training.fit import RunConfig, fit, threads
 from doorstate.training.recipes import Recipe, find_recipe
@@ -37,10 +37,10 @@ from doorstate.training.rule_run import RuleRunConfig, answer
 from doorstate.training.run_folder import RunFolder, check_same, read_json, run_of, write_json
 from doorstate.types import PARTS
 
-M = TypeVar("M", bound=Frozen)
+M = TypeVar("M", bound=FrozenModel)
 
 
-class Experiment(Frozen):
+class Experiment(FrozenModel):
     """One flat experiment file; the same keys are options of `doorstate compare`."""
 
     name: str
@@ -59,7 +59,9 @@ class Experiment(Frozen):
     # A comparison whose weights of the same network and fold the runs go on from; networks it has not begin anew.
     start_from: str | None = None
     heads: tuple[str, ...] = ()  # answers besides the state, trained jointly
-    more_to_learn: tuple[str, ...] = ()  # data sets that are learned whole in every fold, and never tested
+    extra_train_datasets: tuple[
+        str, ...
+    ] = ()  # data sets that are learned whole in every fold, and never tested
 
     def recipe_of(self, network: str) -> Recipe:
         """The recipe of a network, changes applied.
@@ -72,7 +74,7 @@ class Experiment(Frozen):
         try:
             return Recipe.model_validate(recipe.model_dump() | changes)
         except ValidationError as error:
-            problem = first_problem(error, Recipe.model_fields)
+            problem = first_validation_error(error, Recipe.model_fields)
             raise ConfigError(f"experiment {self.name}: recipe_changes: {problem}") from error
 
     def heads_of(self, network: str) -> tuple[str, ...]:
@@ -94,7 +96,7 @@ class Experiment(Frozen):
         for name in self.network_changes:
             network_class(name)
         for network in self.networks:
-            give_heads(create_network(network), self.heads_of(network))
+            add_heads(create_network(network), self.heads_of(network))
             if self.recipe_of(network).epochs and self.protocol == UNSEEN:
                 raise ConfigError(
                     f"experiment {self.name}: protocol {UNSEEN} trains nothing: set recipe_changes.epochs = 0"
@@ -139,7 +141,9 @@ def load_experiment(path: Path | None, overrides: Mapping[str, Any]) -> Experime
     try:
         experiment = Experiment.model_validate(values | given)
     except ValidationError as error:
-        raise ConfigError(f"{path or 'options'}: {first_problem(error, Experiment.model_fields)}") from error
+        raise ConfigError(
+            f"{path or 'options'}: {first_validation_error(error, Experiment.model_fields)}"
+        ) from error
     experiment = experiment.model_copy(
         update={
             "recipe_changes": experiment.recipe_changes | wanted,
@@ -159,7 +163,7 @@ def read_study(path: Path, model: type[M]) -> M:
     try:
         return model.model_validate({"name": path.stem} | read_toml(path, "a study"))
     except ValidationError as error:
-        raise ConfigError(f"{path}: {first_problem(error, model.model_fields)}") from error
+        raise ConfigError(f"{path}: {first_validation_error(error, model.model_fields)}") from error
 
 
 def read_toml(path: Path, what: str) -> dict[str, Any]:
@@ -227,7 +231,7 @@ def prepare_comparison(experiment: Experiment, folder: Path) -> None:
         earlier = read_comparison(before)
         if not set(experiment.networks) & set(earlier["networks"]):
             raise RunError(f"{before}: has none of {', '.join(experiment.networks)} to go on from")
-        if experiment.dataset in earlier.get("more_to_learn", ()):
+        if experiment.dataset in earlier.get("extra_train_datasets", ()):
             raise RunError(f"{before}: has learned all of {experiment.dataset}, which is tested here")
         if earlier["dataset"] == experiment.dataset:  # in another, the same name is another sample
             _check_unseen(read_splits(splits_path), before)
@@ -237,8 +241,8 @@ def prepare_comparison(experiment: Experiment, folder: Path) -> None:
 def _check_more(experiment: Experiment, dataset: PreparedDataset) -> None:
     """Raise ConfigError for data sets to learn besides that show scenes of the one that is tested, or do not fit it."""
     heads = {head for network in experiment.networks for head in experiment.heads_of(network)}
-    known = {origin(row) for row in dataset.rows} if experiment.more_to_learn else set()
-    for path in experiment.more_to_learn:
+    known = {origin(row) for row in dataset.rows} if experiment.extra_train_datasets else set()
+    for path in experiment.extra_train_datasets:
         more = open_dataset(Path(path))
         check_states(more, more.sample_ids, experiment.heads)
         check_thinned_alike(more, dataset)
@@ -246,7 +250,7 @@ def _check_more(experiment: Experiment, dataset: PreparedDataset) -> None:
         CloudLoader(more, more.sample_ids[:1], experiment.num_points, heads=sorted(heads))
         if shared := [row["sample_id"] for row in more.rows if origin(row) in known]:
             raise ConfigError(
-                f"more_to_learn: {len(shared)} samples of {path} show scenes of {experiment.dataset}, "
+                f"extra_train_datasets: {len(shared)} samples of {path} show scenes of {experiment.dataset}, "
                 f"such as {shared[0]}: make it with another seed"
             )
 
@@ -299,7 +303,7 @@ def train_one(
     if not 0 <= fold < len(splits):
         raise ConfigError(f"there is no fold {fold}: folds are 0 to {len(splits) - 1}")
     recipe = experiment.recipe_of(network)
-    more_to_learn = experiment.more_to_learn if recipe.epochs else ()
+    extra_train_datasets = experiment.extra_train_datasets if recipe.epochs else ()
     config = RunConfig(
         network=network,
         dataset=experiment.dataset,
@@ -310,9 +314,9 @@ def train_one(
         recipe=recipe,
         start_from=_weights_before(experiment, network, fold),
         heads=experiment.heads_of(network),
-        more_to_learn=more_to_learn,
+        extra_train_datasets=extra_train_datasets,
     )
-    more = [open_dataset(Path(each)) for each in more_to_learn]
+    more = [open_dataset(Path(each)) for each in extra_train_datasets]
     return fit(config, dataset, splits[fold], folder, more)
 
 

@@ -1,15 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a result was made with.
-
-torch is imported where it is asked, since `keep_freed_memory` serves those who do without.
-"""
+"""Description of the machine and the libraries that a result was made with."""
 
 from __future__ import annotations
 
-import ctypes
 import logging
 import platform
-import sys
 from collections.abc import Callable
 from functools import wraps
 from pathlib import Path
@@ -21,8 +16,6 @@ from doorstate import __version__
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
-
-_M_TRIM_THRESHOLD, _M_MMAP_MAX = -1, -4  # malloc.h of glibc
 
 
 def describe_environment() -> dict[str, str | int | bool]:
@@ -50,20 +43,6 @@ def processor_name() -> str:
             if line.startswith("model name"):
                 return line.partition(":")[2].strip()
     return platform.processor() or platform.machine()
-
-
-def keep_freed_memory() -> None:
-    """Let this process reuse freed memory instead of giving it back after every tensor, where the C library is glibc.
-
-    glibc maps every large block anew and the kernel fills it with zeros, which takes as long as the arithmetic on it:
-    a training step of PointNet++ is more than twice as quick without (docs/log.md).
-    """
-    if not sys.platform.startswith("linux"):
-        return
-    mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
-    if mallopt is not None:
-        mallopt(_M_MMAP_MAX, 0)
-        mallopt(_M_TRIM_THRESHOLD, 2**31 - 1)
 
 
 def bf16_is_quick() -> bool:

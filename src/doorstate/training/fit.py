@@ -25,24 +25,25 @@ from sklearn.metrics import accuracy_score, f1_score
 from torch import Tensor
 from torch.nn import functional
 
+from doorstate._files import atomic_path
+from doorstate._memory import keep_freed_memory
+from doorstate._models import FrozenModel
 from doorstate.dataset.loader import Batch, CloudLoader
 from doorstate.dataset.splits import Role
 from doorstate.dataset.store import PreparedDataset
-from doorstate.dataset.targets import NO_STATE
+from doorstate.dataset.targets import IGNORE_INDEX
 from doorstate.errors import ConfigError, DatasetError, RunError, WeightsError
-from doorstate.files import atomic_path
-from doorstate.models import Frozen
 from doorstate.networks import create_network
 from doorstate.networks.base import PointNetwork
-from doorstate.networks.heads import STATE, answers, give_heads, joint_losses
+from doorstate.networks.card import WeightsCard
+from doorstate.networks.decoding import in_metres, write_answers
+from doorstate.networks.heads import STATE, add_heads, answers, joint_losses
 from doorstate.networks.layers import set_batchnorm
-from doorstate.training.answers import in_metres, write_answers
-from doorstate.training.card import WeightsCard
-from doorstate.training.environment import bf16_is_quick, compiled, describe_environment, keep_freed_memory
+from doorstate.networks.weights import load_into, read_card, save_weights
+from doorstate.training.environment import bf16_is_quick, compiled, describe_environment
 from doorstate.training.optimizers import create_optimizers
 from doorstate.training.recipes import Recipe, batchnorm_momentum, learning_rate, resolution_of_epoch
 from doorstate.training.run_folder import RunFolder, write_predictions
-from doorstate.training.weights import load_into, read_card, save_weights
 from doorstate.types import NO_DOOR, PARTS, STATES, Part
 
 _ROLES: tuple[Role, ...] = ("train", "val", "test")
@@ -51,7 +52,7 @@ _TELL_EVERY_S = 1.0
 _SAVE_EVERY_S = 180.0  # within an epoch, which can take a quarter of an hour
 
 
-class RunConfig(Frozen):
+class RunConfig(FrozenModel):
     """What a run trains; kept in its folder, and a folder is continued only with the same."""
 
     network: str
@@ -64,7 +65,9 @@ class RunConfig(Frozen):
     recipe: Recipe
     start_from: str | None = None  # a weights file to go on from
     heads: tuple[str, ...] = ()  # answers besides the state (networks.heads)
-    more_to_learn: tuple[str, ...] = ()  # data sets whose samples are all learned besides those of the fold
+    extra_train_datasets: tuple[
+        str, ...
+    ] = ()  # data sets whose samples are all learned besides those of the fold
 
 
 class Evaluation(NamedTuple):
@@ -72,14 +75,14 @@ class Evaluation(NamedTuple):
 
     loss: float
     probabilities: np.ndarray
-    labels: np.ndarray  # (M,) int64, NO_STATE without a door
+    labels: np.ndarray  # (M,) int64, IGNORE_INDEX without a door
     answers: dict[str, np.ndarray]  # by head, (M, answers), in the network's units
     part_counts: np.ndarray | None  # (parts, parts) points by true and predicted part
 
     @property
     def doors(self) -> np.ndarray:
         """(M,) whether the sample has a state."""
-        doors: np.ndarray = self.labels != NO_STATE
+        doors: np.ndarray = self.labels != IGNORE_INDEX
         return doors
 
     @property
@@ -111,7 +114,7 @@ def fit(
         roles: {sample_id: role} of this fold. With neither validation nor test samples the last epoch is kept and
             nothing is tested: that is how weights for use are trained on everything, once a recipe has been chosen.
         folder: of this run; finished runs are returned as they are, begun ones are continued.
-        more: clouds of `config.more_to_learn`.
+        more: clouds of `config.extra_train_datasets`.
 
     Returns:
         The run's metrics, as in its `metrics.json`.
@@ -162,7 +165,7 @@ def evaluate(network: PointNetwork, loader: CloudLoader, fabric: lightning_fabri
         found["labels"].append(batch.labels)
     joined = {name: torch.cat(values) for name, values in found.items()}
     logits, labels = joined.pop(STATE), joined.pop("labels")
-    loss = functional.cross_entropy(logits, labels, ignore_index=NO_STATE).item()
+    loss = functional.cross_entropy(logits, labels, ignore_index=IGNORE_INDEX).item()
     others = {name: values.numpy() for name, values in joined.items()}
     return Evaluation(loss, logits.softmax(1).numpy(), labels.numpy(), others, part_counts)
 
@@ -175,7 +178,7 @@ def confusion_counts(parts: Tensor, said: Tensor) -> np.ndarray:
     return counts.view(size, size).numpy()
 
 
-class _Begun(NamedTuple):
+class EpochProgress(NamedTuple):
     """How far an epoch is: losses of the iterations done, torch's generator for what is left, and seconds it took."""
 
     losses: list[float]
@@ -206,7 +209,7 @@ class _Trainer:
         self.log: list[dict[str, float]] = []
         self.best: tuple[float, float] = (-1.0, -math.inf)
         self.best_epoch = -1
-        self.begun: _Begun | None = None
+        self.begun: EpochProgress | None = None
         self._resume()
 
     def train(self) -> None:
@@ -307,7 +310,7 @@ class _Trainer:
             losses.append(self._step(self.fabric.to_device(batch)))
             if time.perf_counter() - saved > _SAVE_EVERY_S:
                 saved = time.perf_counter()
-                self._checkpoint(_Begun(losses, torch.get_rng_state(), saved - started))
+                self._checkpoint(EpochProgress(losses, torch.get_rng_state(), saved - started))
         mean = float(np.mean(losses))
         if not math.isfinite(mean):
             raise RunError(f"{self.run.path}: the loss is {mean} in epoch {epoch}; try a lower learning rate")
@@ -343,7 +346,7 @@ class _Trainer:
             optimizer.step()
         return float(loss.detach())
 
-    def _checkpoint(self, begun: _Begun | None = None) -> None:
+    def _checkpoint(self, begun: EpochProgress | None = None) -> None:
         state = {
             "network": self.network.state_dict(),
             "optimizers": [optimizer.state_dict() for optimizer in self.optimizers],
@@ -372,7 +375,7 @@ class _Trainer:
             optimizer.load_state_dict(values)
         self.log, self.best_epoch = state["log"], state["best_epoch"]
         self.best = (state["best"][0], state["best"][1])
-        self.begun = _Begun(*state["begun"]) if state.get("begun") else None
+        self.begun = EpochProgress(*state["begun"]) if state.get("begun") else None
 
     @property
     def _num_more(self) -> int:
@@ -393,7 +396,7 @@ class _Trainer:
 
 def _build(config: RunConfig) -> PointNetwork:
     network = create_network(config.network, len(STATES), **_network_options(config))
-    give_heads(network, config.heads)
+    add_heads(network, config.heads)
     return network
 
 

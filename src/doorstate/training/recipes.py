@@ -8,13 +8,13 @@ from typing import Any, Literal, NamedTuple
 
 from pydantic import Field, NonNegativeFloat, SerializerFunctionWrapHandler, model_serializer
 
-from doorstate.clouds.augment import Augmentation
+from doorstate._models import FrozenModel
+from doorstate.clouds.augmentation import Augmentation
 from doorstate.clouds.preparation import NUM_POINTS
 from doorstate.errors import ConfigError
-from doorstate.models import Frozen
 
 
-class Stage(Frozen):
+class Stage(FrozenModel):
     """A share of the epochs on less of each cloud; clouds are progressive, so that is a slice."""
 
     share: float = Field(gt=0, le=1)
@@ -29,7 +29,7 @@ class Resolution(NamedTuple):
     centres: float
 
 
-class Recipe(Frozen):
+class Recipe(FrozenModel):
     """Everything that decides how a network is trained but the data and the network."""
 
     name: str
@@ -62,7 +62,7 @@ class Recipe(Frozen):
     compile: bool = False  # torch.compile; docs/speed.md has what it brings
 
     @model_serializer(mode="wrap")
-    def _without_what_is_not_given(self, fields: SerializerFunctionWrapHandler) -> dict[str, Any]:
+    def _omit_defaults(self, fields: SerializerFunctionWrapHandler) -> dict[str, Any]:
         # Runs that were begun before there were these go on.
         later = ("clouds_per_epoch", "part_points", "loss_weights")
         return {

@@ -9,14 +9,14 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
+from doorstate._models import FrozenModel
 from doorstate.clouds.preparation import MIN_POINTS
-from doorstate.models import Frozen
 from doorstate.networks import list_networks
 from doorstate.training.comparison import Experiment, read_study
 from doorstate.training.run_folder import AS_TRAINED, FINE_TUNED
 
 
-class ResolutionStudy(Frozen):
+class ResolutionStudy(FrozenModel):
     """One flat study file: which weights, on how many points."""
 
     name: str

@@ -12,22 +12,22 @@ from typing import Any
 import numpy as np
 from sklearn.metrics import accuracy_score, f1_score
 
+from doorstate._files import write_csv, write_text
+from doorstate._models import FrozenModel
 from doorstate.dataset.splits import Role
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import DatasetError
-from doorstate.files import write_csv, write_text
-from doorstate.models import Frozen
 from doorstate.rules import create_rule
-from doorstate.rules.base import Answer
+from doorstate.rules.base import RuleResult
 from doorstate.training.environment import describe_environment
 from doorstate.training.run_folder import RunFolder
-from doorstate.types import NO_ANSWER, NO_DOOR, STATES
+from doorstate.types import ABSTAINED, NO_DOOR, STATES
 
 _TELL_EVERY_S = 1.0
 _OPEN_OR_NOT = ("not_open", "open")
 
 
-class RuleRunConfig(Frozen):
+class RuleRunConfig(FrozenModel):
     """What a run answers with; kept in its folder, and a folder is continued only with the same."""
 
     rule: str
@@ -40,10 +40,10 @@ class RuleRunConfig(Frozen):
 def answer(
     config: RuleRunConfig, dataset: PreparedDataset, roles: Mapping[str, Role], folder: Path
 ) -> dict[str, Any]:
-    """Answer the test samples of a fold from their raw clouds; a finished run is returned as it is.
+    """RuleResult the test samples of a fold from their raw clouds; a finished run is returned as it is.
 
     Predictions have more columns than a network's: reason, opening_angle_deg, opening_width_m, open_or_not. What was
-    found where the answer is not right is kept in `found.jsonl`, for the report to draw.
+    found where the answer is not right is kept in `detections.jsonl`, for the report to draw.
 
     Raises:
         DatasetError: no sample is tested.
@@ -71,13 +71,13 @@ def answer(
         milliseconds.append(1000 * (time.perf_counter() - before))
         rows.append(_row(sample, dataset.rows[index]["state"], given))
         if rows[-1]["state"] != rows[-1]["predicted"]:
-            shapes = [[shape.name, np.round(shape.points_m, 3).tolist()] for shape in given.found]
+            shapes = [[shape.name, np.round(shape.points_m, 3).tolist()] for shape in given.detections]
             found.append(json.dumps({"sample_id": sample, "found": shapes}))
         if time.perf_counter() - told > _TELL_EVERY_S:
             told = time.perf_counter()
             run.write_position((done + 1) / len(tested))
     write_csv(run.predictions, rows)
-    write_text(run.found, "".join(line + "\n" for line in found))
+    write_text(run.detections, "".join(line + "\n" for line in found))
     true, said = [row["state"] for row in rows], [row["predicted"] for row in rows]
     metrics = {
         "network": config.rule,
@@ -86,7 +86,7 @@ def answer(
         "test_samples": len(tested),
         "test_macro_f1": float(f1_score(true, said, labels=STATES, average="macro", zero_division=0)),
         "test_accuracy": float(accuracy_score(true, said)),
-        "no_answer": said.count(NO_ANSWER),
+        "abstained": said.count(ABSTAINED),
         "median_ms": float(np.median(milliseconds)),
         "p95_ms": float(np.quantile(milliseconds, 0.95)),
     }
@@ -94,8 +94,8 @@ def answer(
     return metrics
 
 
-def _row(sample: str, state: str, answer: Answer) -> dict[str, str]:
-    said = NO_ANSWER if answer.state is None else answer.state.label
+def _row(sample: str, state: str, answer: RuleResult) -> dict[str, str]:
+    said = ABSTAINED if answer.state is None else answer.state.label
     return {
         "sample_id": sample,
         "state": state,

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from doorstate._files import read_csv, write_csv, write_text
 from doorstate.errors import RunError
-from doorstate.files import read_csv, write_csv, write_text
 from doorstate.types import STATES
 
 AS_TRAINED, FINE_TUNED = "as-trained", "fine-tuned"  # parts of a resolution study: folders AS_TRAINED-POINTS
@@ -19,7 +19,7 @@ AS_TRAINED, FINE_TUNED = "as-trained", "fine-tuned"  # parts of a resolution stu
 _SINCE: dict[str, Any] = {
     "heads": [],
     "rules": [],
-    "more_to_learn": [],
+    "extra_train_datasets": [],
 }  # of settings: what older folders do not know
 
 
@@ -37,7 +37,7 @@ class RunFolder:
         self.predictions = path / "predictions.csv"
         self.validation = path / "validation.csv"  # the same of the samples that the epoch was chosen on
         self.answers = path / "answers.csv"  # of further heads, to all test samples
-        self.found = path / "found.jsonl"  # what a rule found in samples that it did not get right
+        self.detections = path / "detections.jsonl"  # what a rule found in samples that it did not get right
         self.metrics = path / "metrics.json"
 
     @property

@@ -9,11 +9,11 @@ from typing import Annotated, NamedTuple
 
 from pydantic import Field
 
+from doorstate._models import FrozenModel
 from doorstate.clouds.preparation import NUM_POINTS
 from doorstate.dataset.splits import UNSEEN, Role, origin, read_splits, write_splits
 from doorstate.dataset.store import open_dataset
 from doorstate.errors import ConfigError, RunError
-from doorstate.models import Frozen
 from doorstate.networks import list_networks
 from doorstate.training.comparison import Experiment, read_comparison, read_study
 
@@ -33,7 +33,7 @@ class Cell(NamedTuple):
         return Path(self.trained, self.tested)
 
 
-class TransferStudy(Frozen):
+class TransferStudy(FrozenModel):
     """One flat study file: finished comparisons by name, whose fold 0 is tested, and data sets by name."""
 
     name: str
@@ -110,6 +110,6 @@ def _seen(comparison: str) -> set[str]:
         for row in open_dataset(Path(asked["dataset"])).rows
         if roles[row["sample_id"]] in ("train", "val")
     ]
-    for more in asked.get("more_to_learn", ()):
+    for more in asked.get("extra_train_datasets", ()):
         rows += open_dataset(Path(more)).rows
     return {origin(row) for row in rows}

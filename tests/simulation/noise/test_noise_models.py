@@ -15,9 +15,9 @@ import pytest
 from benchmarks.sensors import PUBLISHED_SIGMA_M, cropped, measure, measured, only, sensors_table, wall
 from pydantic import ValidationError
 
+from doorstate._jobs import no_progress
 from doorstate.dataset.deepdoors2 import CAMERA as DEEPDOORS2
 from doorstate.errors import ConfigError
-from doorstate.jobs import no_progress
 from doorstate.simulation.noise.models import SENSORS, SensorModel, apply, distort, find_sensor
 from doorstate.simulation.scene import Box, Door, build_scene
 from doorstate.simulation.sensor import (

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from doorstate.models import Frozen
+from doorstate._models import FrozenModel
 from doorstate.types import DepthImage
 
 _STEEPEST_RAD = np.float32(math.radians(85.0))  # chosen: the published term is infinite at 90 degrees
 
 
-class ConstantAxial(Frozen):
+class ConstantAxial(FrozenModel):
     """The same everywhere."""
 
     kind: Literal["constant"] = "constant"
@@ -38,7 +38,7 @@ class ConstantAxial(Frozen):
         return np.full(depth_m.shape, self.deviation_m, np.float32)
 
 
-class NguyenAxial(Frozen):
+class NguyenAxial(FrozenModel):
     """Kinect v1 as Nguyen, Izadi and Lovell 2012 measured it: s = a + b (z - c)^2, beyond 60 degrees with
     d / sqrt(z) t^2 / (pi / 2 - t)^2 at incidence t.
 
@@ -67,7 +67,7 @@ class NguyenAxial(Frozen):
         return sigma
 
 
-class StereoAxial(Frozen):
+class StereoAxial(FrozenModel):
     """Stereo of sub-pixel precision p: s = p z^2 / (f b), as Intel states it for RealSense cameras (SIMULATION 3.1)."""
 
     kind: Literal["stereo"] = "stereo"

@@ -9,18 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from doorstate.models import Frozen
+from doorstate._models import FrozenModel
 from doorstate.types import DepthImage
 
 
-class Grazing(Frozen):
+class Grazing(FrozenModel):
     """The share lost grows from 0 to 1 between two angles of incidence (SIMULATION section 3.2)."""
 
     from_deg: float = 70.0
     to_deg: float = 90.0
 
 
-class Speckle(Frozen):
+class Speckle(FrozenModel):
     """Squares that are lost at random, so that this share of all pixels is."""
 
     share: float = Field(ge=0, lt=1)

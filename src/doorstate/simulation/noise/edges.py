@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from doorstate.models import Frozen
+from doorstate._models import FrozenModel
 from doorstate.types import DepthImage
 
 
-class Edges(Frozen):
+class Edges(FrozenModel):
     """Shares of SIMULATION section 3.2."""
 
     jump: float = Field(default=0.05, gt=0)  # of the nearer depth, to one of the four pixels around

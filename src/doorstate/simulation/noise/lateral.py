@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from doorstate.models import Frozen
+from doorstate._models import FrozenModel
 from doorstate.simulation.sensor import Render
 
 
-class Lateral(Frozen):
+class Lateral(FrozenModel):
     """Standard deviation of Nguyen, Izadi and Lovell 2012: s = base + slope t / (pi / 2 - t) pixels at incidence t."""
 
     base_px: float = Field(default=0.8, ge=0)

@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from doorstate.clouds.camera import Intrinsics
-from doorstate.models import Frozen
+from doorstate._models import FrozenModel
+from doorstate.io.camera import Intrinsics
 from doorstate.simulation.scene import Box
 from doorstate.simulation.sensor import CameraPose, Render, is_made_of, render
 from doorstate.types import DepthImage
 
 
-class Materials(Frozen):
+class Materials(FrozenModel):
     """Shares of pixels lost, of SIMULATION section 3.2 but for what is marked as chosen."""
 
     glass_lost: float = Field(default=0.7, ge=0, le=1)  # the others see what is behind the pane

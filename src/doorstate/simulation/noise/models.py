@@ -10,9 +10,9 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from doorstate.clouds.camera import Intrinsics
+from doorstate._models import FrozenModel
 from doorstate.errors import ConfigError
-from doorstate.models import Frozen
+from doorstate.io.camera import Intrinsics
 from doorstate.simulation.noise.axial import Axial, ConstantAxial, NguyenAxial, StereoAxial, add_noise
 from doorstate.simulation.noise.dropout import Grazing, Speckle, lose_grazing, lose_speckle
 from doorstate.simulation.noise.edges import Edges, blur_edges
@@ -34,7 +34,7 @@ Number = TypeVar("Number", bound=np.generic)
 _ANGLE_STEPS = np.float32(2**14)  # in a radian
 
 
-class SensorModel(Frozen):
+class SensorModel(FrozenModel):
     """A camera and its stages, which come in the order of the fields; a stage that is None is left out."""
 
     name: str

@@ -6,11 +6,11 @@ from __future__ import annotations
 import numpy as np
 from pydantic import Field
 
-from doorstate.models import Frozen
+from doorstate._models import FrozenModel
 from doorstate.types import DepthImage
 
 
-class DisparitySteps(Frozen):
+class DisparitySteps(FrozenModel):
     """Disparity f b / z in whole steps; depth then has steps of about z^2 step / (f b)."""
 
     baseline_m: float = Field(gt=0)
@@ -21,7 +21,7 @@ class DisparitySteps(Frozen):
         return depth_m * depth_m * np.float32(self.step_px / (focal_px * self.baseline_m))
 
 
-class DepthSteps(Frozen):
+class DepthSteps(FrozenModel):
     """Depth in whole steps, kept in a number of bits."""
 
     step_m: float = Field(gt=0)

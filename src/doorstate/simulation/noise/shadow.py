@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from doorstate.models import Frozen
+from doorstate._models import FrozenModel
 from doorstate.types import DepthImage
 
 
-class SecondView(Frozen):
+class SecondView(FrozenModel):
     """Where the projector or second imager is."""
 
     baseline_m: float = Field(gt=0)

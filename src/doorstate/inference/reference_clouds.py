@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Simulated doors that no weights were trained on, to compare and to measure with: the same ones every time."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from doorstate._jobs import Progress, no_progress
+from doorstate.clouds.preparation import prepare_cloud
+from doorstate.errors import ConfigError
+from doorstate.simulation.frames import replay
+from doorstate.simulation.generate import PRESETS, SampleRow, draw_pose, pose_indices
+from doorstate.types import STATES, Points
+
+_SEED = 1_000_003  # of no data set
+
+
+class LabelledClouds(NamedTuple):
+    """What to compare on."""
+
+    points: Points  # (M, n, 3) metres in farthest-point order
+    labels: NDArray[np.int64]  # (M,)
+
+
+def reference_rows(count: int) -> list[SampleRow]:
+    """Rows of doors in all three states, poses spread over the room."""
+    poses = pose_indices(max(3, -(-count // len(STATES))))
+    return [row for pose in poses for row in draw_pose(PRESETS["ogurob"], _SEED, pose)][:count]
+
+
+def reference_clouds(count: int, num_points: int, progress: Progress = no_progress) -> LabelledClouds:
+    """Render and prepare `reference_rows`.
+
+    Raises:
+        ConfigError: more points than a simulated cloud has.
+    """
+    rows, clouds = reference_rows(count), []
+    for row in rows:
+        clouds.append(prepare_cloud(replay(row).points, num_points, thin=True).points)
+        progress(len(clouds), count)
+    fewest = min(map(len, clouds))
+    if fewest < num_points:
+        raise ConfigError(f"--points {num_points}: a simulated cloud has only {fewest} distinct points")
+    labels = np.array([STATES.index(row.state) for row in rows], dtype=np.int64)
+    return LabelledClouds(np.stack(clouds), labels)

@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The fields of the ROS messages that hold depth images, read as pixels; needs no ROS."""
+
+from __future__ import annotations
+
+import struct
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from doorstate.errors import CloudReadError
+from doorstate.io.png import parse_depth_png
+from doorstate.io.pointcloud2 import MessageBytes
+from doorstate.io.size_limits import check_point_count, check_size
+
+DEPTH_ENCODINGS = {"16UC1": "u2", "mono16": "u2", "32FC1": "f4"}
+# compressed_depth_image_transport, compression_common.h: the format, and the two parameters of inverse depth.
+_PARAMETERS = struct.Struct("<iff")
+
+
+def pixels_from_image(
+    height: int, width: int, encoding: str, is_bigendian: bool, step: int, data: MessageBytes
+) -> NDArray[Any]:
+    """Read a sensor_msgs/Image of depth.
+
+    Args:
+        height, width: rows and columns.
+        encoding: 16UC1, mono16 or 32FC1.
+        is_bigendian: byte order of the pixels.
+        step: bytes from a row to the next.
+        data: the pixels.
+
+    Returns:
+        (height, width) uint16 (millimetres by ROS REP 118) or float32 (metres), as stored.
+
+    Raises:
+        CloudReadError: when it is another image, or contradicts itself.
+    """
+    check_encoding(encoding)
+    dtype = np.dtype(DEPTH_ENCODINGS[encoding]).newbyteorder(">" if is_bigendian else "<")
+    if min(height, width) < 1 or width * dtype.itemsize > step:
+        raise CloudReadError(f"is damaged: {height} rows of {width} pixels in {step} bytes are declared")
+    check_point_count(height * width)
+    content = np.frombuffer(data, np.uint8)
+    check_size(height * step, len(content), "bytes")
+    pixels: NDArray[Any] = np.ndarray((height, width), dtype, content, strides=(step, dtype.itemsize))
+    return pixels.astype(dtype.newbyteorder("="))
+
+
+def pixels_from_compressed_depth(image_format: str, data: MessageBytes) -> NDArray[Any]:
+    """Read a sensor_msgs/CompressedImage of the image transport `compressedDepth` that holds a PNG.
+
+    Args:
+        image_format: such as `16UC1; compressedDepth png`.
+        data: twelve bytes of parameters, then the PNG.
+
+    Returns:
+        (H, W) as of `pixels_from_image`; of 32FC1 the PNG holds inverse depth, NaN where it is 0.
+
+    Raises:
+        CloudReadError: when it is another image, compressed in another way, or damaged.
+    """
+    check_compressed_format(image_format)
+    content = bytes(data)
+    stored = parse_depth_png(content[_PARAMETERS.size :])
+    if DEPTH_ENCODINGS[_encoding(image_format)] == "u2":
+        return stored
+    _, quant_a, quant_b = _PARAMETERS.unpack_from(content)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        depth_m = quant_a / (stored.astype(np.float32) - np.float32(quant_b))
+    return np.where(stored > 0, depth_m, np.float32(np.nan)).astype(np.float32)
+
+
+def check_encoding(encoding: str) -> None:
+    """Raise CloudReadError unless images of this encoding are depth images."""
+    if encoding not in DEPTH_ENCODINGS:
+        raise CloudReadError(
+            f"is an image in {encoding or 'no encoding'}, not depth ({', '.join(DEPTH_ENCODINGS)})"
+        )
+
+
+def check_compressed_format(image_format: str) -> None:
+    """Raise CloudReadError unless compressed images of this format are depth images that can be read."""
+    if "compressedDepth" not in image_format:
+        raise CloudReadError(f"is an image compressed as {image_format!r}, not compressedDepth")
+    if "rvl" in image_format:
+        raise CloudReadError(f"is compressed as {image_format!r}: only PNG can be read")
+    check_encoding(_encoding(image_format))
+
+
+def _encoding(image_format: str) -> str:
+    return image_format.partition(";")[0].strip()

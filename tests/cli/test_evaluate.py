@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`doorstate evaluate` as typed at a prompt, and its page in a browser."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from doorstate._files import write_csv
+from doorstate.simulation.frames import replay
+from doorstate.simulation.generate import PRESETS, draw_pose
+from doorstate.types import ABSTAINED
+from headless_chromium import Browser
+
+Run = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture(scope="module")
+def recordings(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Depth images of a simulated camera with their index: two doors, one frame without, one that is no depth image."""
+    folder = tmp_path_factory.mktemp("recordings") / "lab"
+    folder.mkdir()
+    camera = {"fx": "554.3", "fy": "554.3", "cx": "319.5", "cy": "239.5", "depth_unit_m": "0.001"}
+    rows = []
+    for pose, door in ((700, "oak"), (300, "glass front")):
+        for sample in draw_pose(PRESETS["ogurob"], 3, pose):
+            frame = replay(sample)
+            name = f"{pose}_{sample.state}.png"
+            depth_mm = np.nan_to_num(frame.cut.depth_m * 1000).astype(np.uint16)
+            Image.fromarray(depth_mm).save(folder / name)
+            rows.append({"file": name, "state": sample.state, "door": door, **camera})
+    Image.new("RGB", (64, 48), (200, 10, 10)).save(folder / "photo_rgb.png")
+    rows[0]["rgb"] = "photo_rgb.png"
+    Image.fromarray(np.full((480, 640), 2500, np.uint16)).save(folder / "wall.png")
+    rows.append({"file": "wall.png", "state": "none", "door": "", **camera})
+    Image.new("L", (640, 480)).save(folder / "coarse.png")
+    rows.append({"file": "coarse.png", "state": "open", "door": "oak", **camera})
+    write_csv(folder / "index.csv", rows)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("report")
+
+
+def test_answers_are_counted_and_written(recordings: Path, report: Path, weights: Path, run: Run) -> None:
+    code, out, err = run(
+        "evaluate",
+        recordings,
+        *("--weights", weights, "--rule", "plane_state", "--by", "door:glass", "--all", "--out", report),
+    )
+    assert code == 1  # one file could not be read
+    assert err.startswith("coarse.png: 8-bit image")
+    assert "1 of 8 files could not be read and are not counted" in err
+    assert "6 frames with a door of 2 doors, as column door names them: 2 closed, 2 semi-open, 2 open." in out
+    assert "Frames without a clear door" in out
+    metrics = json.loads((report / "metrics.json").read_text(encoding="utf-8"))
+    assert list(metrics["methods"]) == ["pointnet", "plane_state"]
+    assert list(metrics["not_read"]) == ["coarse.png"]
+    # A door without noise, 2 to 3 m away, is what the rule is for.
+    assert metrics["methods"]["plane_state"]["all"]["right"] >= 5
+    with (report / "predictions.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 2 * 7
+    assert (
+        sum(row["predicted"] == row["state"] for row in rows if row["method"] == "plane_state")
+        == (metrics["methods"]["plane_state"]["all"]["right"])
+    )
+    assert (
+        (report / "tables" / "recall.md").read_text(encoding="utf-8").startswith("**Recall of each state**")
+    )
+
+
+def test_the_page_draws_every_cloud_and_filters(report: Path, tmp_path: Path) -> None:
+    with Browser(tmp_path / "profile") as browser:
+        browser.open((report / "frames.html").as_uri())
+        assert browser.evaluate("document.querySelectorAll('.card').length") == 7
+        assert browser.evaluate("document.querySelectorAll('.card .cloud').length") == 14
+        # The photo and seven depth images.
+        assert browser.evaluate(
+            "[...document.images].every((each) => each.src.startsWith('data:image/jpeg'))"
+        )
+        assert browser.evaluate("document.images.length") == 8
+        browser.evaluate("document.querySelector('.card .cloud').scrollIntoView({behavior: 'instant'})")
+        painted = (
+            "[...document.querySelector('.card canvas').getContext('2d').getImageData(0, 0, 150, 100).data]"
+        )
+        browser.wait_until(
+            f"document.querySelector('.card canvas').width > 300 || {painted}.some((v) => v > 0)"
+        )
+        chips = "[...document.querySelectorAll('.chips button')].map((each) => each.textContent)"
+        assert browser.evaluate(chips) == ["all", "pointnet wrong", "plane_state wrong"]
+        browser.evaluate("document.querySelectorAll('.chips button')[2].click()")
+        shown = browser.evaluate(
+            "[...document.querySelectorAll('.card:not([hidden])')].map((e) => e.dataset.file)"
+        )
+        with (report / "predictions.csv").open(encoding="utf-8") as file:
+            said = [row for row in csv.DictReader(file) if row["method"] == "plane_state"]
+        right = {"no_door": ABSTAINED}
+        wrong = {row["file"] for row in said if row["predicted"] != right.get(row["state"], row["state"])}
+        assert set(shown) == wrong
+        browser.evaluate("document.querySelectorAll('.chips button')[0].click()")
+        browser.evaluate("document.querySelector('.card .cloud').click()")
+        browser.wait_until("document.querySelector('.live .main-svg') !== null")
+        assert browser.problems == []
+
+
+def test_folders_of_states_are_enough_and_the_same_files_come_out_twice(
+    recordings: Path, run: Run, tmp_path: Path
+) -> None:
+    for state in ("closed", "semi_open", "open"):
+        (tmp_path / state).mkdir()
+        (tmp_path / state / "a.png").write_bytes((recordings / f"700_{state}.png").read_bytes())
+    asked = ("evaluate", tmp_path, "--rule", "plane_state", "--all")
+    camera = ("--fx", 554.3, "--fy", 554.3, "--cx", 319.5, "--cy", 239.5)
+    first, second = tmp_path.with_name("first"), tmp_path.with_name("second")
+    code, out, err = run(*asked, *camera, "--out", first)
+    assert code == 0
+    assert "3 frames with a door: 1 closed, 1 semi-open, 1 open." in out
+    assert "doors" not in out
+    assert err.endswith("frames.html shows the frames\n")
+    code, out, _ = run(*asked, *camera, "--json", "--out", second)
+    assert code == 0
+    written = json.loads((first / "metrics.json").read_text(encoding="utf-8"))
+    assert json.loads(out).items() <= written.items()
+    for name in ("frames.html", "predictions.csv", "metrics.json", "tables/scores.md"):
+        assert (first / name).read_bytes() == (second / name).read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--by", "colour"), "no column 'colour'; there are: door, fx, fy, cx, cy, depth_unit_m, rgb"),
+        (("--group", "building"), "no column 'building'"),
+        (("--rule", "plane_state", "--rule", "plane_state"), "plane_state is asked for twice"),
+        (("--rule", "guess"), "guess"),
+        (("--network", "nobody"), "no weights for 'nobody'"),
+        (("--layout", "kitti"), "no layout 'kitti'"),
+        (("--layout", "deepdoors2", "--roll", "90"), "--layout says how its files are read"),
+        (("--all",), "--all is for the page of --out"),
+        (("--rule", "plane_state", "--points", "512"), "a rule looks at all points"),
+        (("--out", "index.csv/report"), "index.csv/report/frames.html: cannot be written"),
+    ],
+)
+def test_what_cannot_be_done_is_said_in_one_line(
+    arguments: tuple[str, ...], message: str, recordings: Path, run: Run
+) -> None:
+    arguments = tuple(str(recordings / word) if word.startswith("index.csv") else word for word in arguments)
+    code, out, err = run("evaluate", recordings, *arguments)
+    assert (code, out) == (1 if "nobody" in arguments or "--out" in arguments else 2, "")
+    assert message in err
+    assert err.count("\n") == 1
+
+
+def test_nothing_readable_is_an_error(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "open").mkdir()
+    (tmp_path / "open" / "a.pcd").write_bytes(b"no cloud")
+    code, _, err = run("evaluate", tmp_path, "--rule", "plane_state")
+    assert code == 1
+    assert "none of 1 files could be read" in err

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Every network as ONNX: a checked file that onnxruntime answers from as torch does, or no file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import onnx
+import pytest
+import torch
+
+from doorstate.clouds.preparation import normalize, prepare_cloud
+from doorstate.errors import ExportError
+from doorstate.inference import export as onnx_export
+from doorstate.inference.export import TOLERANCE, export_onnx
+from doorstate.inference.onnx_backend import OnnxBackend
+from doorstate.inference.reference_clouds import LabelledClouds
+from doorstate.inference.torch_backend import TorchBackend
+from doorstate.networks import create_network, list_networks
+from doorstate.networks.base import PointNetwork
+from doorstate.networks.card import WeightsCard
+from doorstate.networks.heads import HEADS, add_heads
+from doorstate.networks.layers import set_batchnorm
+
+SLOW = {"pointcnn"}
+
+
+def card_of(name: str) -> WeightsCard:
+    return WeightsCard(network=name, num_points=4096, temperature=0.1, trained_on="nothing")
+
+
+@pytest.fixture(scope="module")
+def clouds() -> LabelledClouds:
+    """Of no doors: simulated walls have neighbours equally far, of which every runtime takes another."""
+    rng = np.random.default_rng(0)
+    sizes_m = rng.uniform(0.3, 3, (7, 1, 3))
+    points = (rng.normal(2, 1, (7, 160, 3)) * sizes_m).astype(np.float32)
+    return LabelledClouds(np.stack([prepare_cloud(cloud, 160).points for cloud in points]), np.arange(7) % 3)
+
+
+def used_to(name: str, clouds: LabelledClouds) -> PointNetwork:
+    """An untrained network whose batch normalisation has seen doors, so that its answers differ."""
+    torch.manual_seed(0)
+    network = create_network(name).train()
+    set_batchnorm(network, momentum=1.0)
+    with torch.no_grad():
+        network(torch.from_numpy(normalize(clouds.points)))
+    return network.eval()
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name in SLOW)) for name in list_networks()]
+)
+def test_the_file_answers_as_torch_does(name: str, clouds: LabelledClouds, tmp_path: Path) -> None:
+    path, network = tmp_path / "network.onnx", used_to(name, clouds)
+    comparison = export_onnx(path, network, card_of(name), clouds)
+    assert comparison.largest <= TOLERANCE == comparison.allowed
+    assert comparison.right == comparison.right_in_torch
+    exported = OnnxBackend(path)
+    expected = TorchBackend(network, 0.1).ask(clouds.points)[0]
+    assert np.ptp(expected, axis=0).max() > 0.1, "answers that are all alike compare nothing"
+    for batch in (clouds.points[:1], clouds.points[1:6]):
+        found = exported.ask(batch)[0]
+        np.testing.assert_allclose(found.sum(1), 1, atol=1e-5)
+    np.testing.assert_allclose(exported.ask(clouds.points)[0], expected, atol=TOLERANCE)
+
+    model = onnx.load(path)
+    onnx.checker.check_model(model, full_check=True)
+    assert model.opset_import[0].version == onnx_export.OPSET
+    (given,), (answered,) = model.graph.input, model.graph.output
+    assert (given.name, answered.name) == ("points", "probabilities")
+    batch, *fixed = given.type.tensor_type.shape.dim
+    assert batch.dim_param
+    assert [size.dim_value for size in fixed] == [160, 3]
+    metadata = {entry.key: entry.value for entry in model.metadata_props}
+    assert metadata["labels"] == "closed,semi_open,open"
+    assert metadata["units"] == "metres"
+    assert {"frame", "preparation"} < set(metadata)
+    assert exported.card == card_of(name).model_copy(update={"num_points": 160})
+
+
+def test_heads_are_outputs_of_the_file(clouds: LabelledClouds, tmp_path: Path) -> None:
+    network, heads = used_to("pointnet2", clouds), (*HEADS, "parts")
+    add_heads(network, heads)
+    card = card_of("pointnet2").model_copy(update={"heads": heads})
+    comparison = export_onnx(tmp_path / "network.onnx", network.eval(), card, clouds)
+    assert comparison.largest <= TOLERANCE
+    exported = OnnxBackend(tmp_path / "network.onnx")
+    _, expected = TorchBackend(network, 0.1).ask(clouds.points)
+    probabilities, columns = exported.ask(clouds.points)
+    assert list(columns) == list(expected)
+    for name, values in expected.items():
+        assert np.ptp(values) > 0 or name.endswith("width_m")  # widths are cut at 0
+        np.testing.assert_allclose(columns[name], values, atol=0.01 if name.endswith("_deg") else 1e-4)
+    assert np.array_equal(probabilities, exported.ask(clouds.points)[0])
+    outputs = [each.name for each in onnx.load(tmp_path / "network.onnx").graph.output]
+    assert outputs == ["probabilities", *HEADS]
+
+
+def test_int8_is_a_quarter_of_the_size_and_another_answer(clouds: LabelledClouds, tmp_path: Path) -> None:
+    network = used_to("pointnet", clouds)
+    comparison = export_onnx(tmp_path / "small.onnx", network, card_of("pointnet"), clouds, int8=True)
+    assert comparison.largest > 0, "it is reported"
+    parameters = sum(parameter.numel() for parameter in network.parameters())
+    assert (tmp_path / "small.onnx").stat().st_size < 1.1 * parameters
+    assert OnnxBackend(tmp_path / "small.onnx").card.num_points == 160
+    assert any(node.op_type == "MatMulInteger" for node in onnx.load(tmp_path / "small.onnx").graph.node)
+
+
+def test_a_file_that_would_answer_otherwise_is_not_written(
+    clouds: LabelledClouds, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(onnx_export, "SCALE_M", 2.0)
+    with pytest.raises(
+        ExportError,
+        match=r"net\.onnx not written: its answers differ from torch's by \S+, more than 0\.0001",
+    ):
+        export_onnx(tmp_path / "net.onnx", used_to("pointnet", clouds), card_of("pointnet"), clouds)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_opset_that_does_not_exist_is_one_line(clouds: LabelledClouds, tmp_path: Path) -> None:
+    with pytest.raises(ExportError, match=r"pointnet cannot be exported with opset 99: .*") as caught:
+        export_onnx(tmp_path / "net.onnx", used_to("pointnet", clouds), card_of("pointnet"), clouds, opset=99)
+    assert "\n" not in str(caught.value)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_rounding_is_what_the_last_digit_does(clouds: LabelledClouds) -> None:
+    card = card_of("pointnet")
+    moved = onnx_export.rounding_in_torch(used_to("pointnet", clouds), card, clouds.points)
+    assert 0 < moved < TOLERANCE
+    # Evenly on a ring, every point has two neighbours at each distance.
+    ring = np.arange(160) * (2 * np.pi / 160)
+    tied = np.stack([np.cos(ring), np.sin(ring), 0 * ring], axis=1).astype(np.float32)[None]
+    network = used_to("pointcnn", clouds)
+    assert onnx_export.rounding_in_torch(network, card_of("pointcnn"), tied) > 10 * moved

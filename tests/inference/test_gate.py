@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Clouds that show too little are refused with a reason, and clouds of doors are not."""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from benchmarks.gate import FAULTS, glass, without
+
+from doorstate.clouds.preparation import is_measured
+from doorstate.dataset.store import PreparedDataset
+from doorstate.errors import ConfigError
+from doorstate.inference.gate import Gate
+from doorstate.inference.predictor import Predictor
+from doorstate.io.camera import Pinhole
+from doorstate.io.readers import ReadOptions, read_cloud
+from doorstate.simulation.frames import replay
+from doorstate.simulation.manifest import unflatten
+from doorstate.types import Points
+
+REAL = Path(__file__).resolve().parents[3] / "shared" / "real"
+HEIGHT, WIDTH = 480, 640
+
+
+def room(wall_m: float = 3.0, floor_m: float = 5.0, opening: bool = False) -> Points:
+    """A wall across the view and a floor 1 m below the camera, (480, 640, 3); the opening is 0.9 m wide, 2.1 m high."""
+    across, up = np.meshgrid(np.linspace(0.58, -0.58, WIDTH), np.linspace(0.43, -0.43, HEIGHT))
+    to_floor_m = np.where(up < 0, 1.0 / np.maximum(-up, 1e-9), np.inf)
+    through = opening & (np.abs(wall_m * across) < 0.45) & (wall_m * up < 1.1)
+    depth_m = np.minimum(np.where(through, np.inf, wall_m), to_floor_m)
+    depth_m[depth_m > floor_m] = np.nan
+    return (depth_m[..., None] * np.stack((np.ones_like(up), across, up), axis=-1)).astype(np.float32)
+
+
+def test_a_wall_and_an_opening_with_floor_behind_pass() -> None:
+    assert Gate()(room()) is None
+    opened = room(opening=True)
+    assert np.isnan(opened).any(axis=-1).mean() > 0.1
+    assert Gate()(opened) is None
+    assert Gate()(opened.reshape(-1, 3)) is None
+
+
+def test_a_hole_passes_only_with_floor_far_away_below_it() -> None:
+    for floor_m, refused in ((5.0, False), (4.2, False), (3.8, True), (3.2, True)):
+        cloud = room(floor_m=floor_m, opening=True)
+        assert (Gate()(cloud) is not None) == refused, floor_m
+        assert (Gate()(cloud.reshape(-1, 3)) is not None) == refused, floor_m
+    assert Gate(free_reach_m=3.5)(room(floor_m=3.8, opening=True)) is None
+
+
+def test_a_hole_is_found_whichever_way_the_camera_was_turned() -> None:
+    opened = room(opening=True)
+    bad = room(floor_m=3.2, opening=True)
+    for quarter_turns in range(4):
+        assert Gate()(np.rot90(opened, quarter_turns)) is None
+        assert "glass or missing data" in (Gate()(np.rot90(bad, quarter_turns)) or "")
+
+
+def test_small_holes_and_the_edges_of_the_image_are_let_through() -> None:
+    cloud = room()
+    small = np.zeros((HEIGHT, WIDTH), dtype=bool)
+    small[200:280, 200:400] = True  # a sixth of the height
+    edges = np.zeros((HEIGHT, WIDTH), dtype=bool)
+    edges[:, :60] = edges[:, -60:] = True
+    narrow = np.zeros((HEIGHT, WIDTH), dtype=bool)
+    narrow[:, 300:340] = True  # 0.08 of what is looked at
+    for missing in (small, edges, narrow):
+        assert Gate()(without(cloud, missing)) is None
+    narrow[:, 300:370] = True
+    assert "glass or missing data" in (Gate()(without(cloud, narrow)) or "")
+
+
+@pytest.mark.parametrize(
+    ("cloud", "reason"),
+    [
+        (np.full((HEIGHT, WIDTH, 3), np.nan, dtype=np.float32), "too few points"),
+        (np.zeros((HEIGHT, WIDTH, 3), dtype=np.float32), "too few points"),
+        (room().reshape(-1, 3)[:100], "too few points"),
+        (room(0.5), "half of the points are within"),
+        (room(8.0, floor_m=9.0), "half of the points are beyond"),
+        (
+            room()[..., (1, 2, 0)] * np.float32((-1, -1, 1)),
+            "lie behind the camera: an optical frame? say --frame optical",
+        ),
+        (room() - np.float32((3.2, 0, 0)), "lie behind the camera: a scan"),
+        (room()[HEIGHT * 3 // 4 :], "m high: too little for a door"),
+        (np.ascontiguousarray(room()[:, : WIDTH // 2]), "degrees wide"),
+        (room().reshape(-1, 3)[room().reshape(-1, 3)[:, 1] > 0], "degrees wide"),
+        (without(room(), np.arange(HEIGHT * WIDTH).reshape(HEIGHT, WIDTH) % 9 > 0), "only 11% of the cloud"),
+    ],
+)
+def test_each_condition_has_its_reason(cloud: Points, reason: str) -> None:
+    assert reason in (Gate()(cloud) or "")
+
+
+def test_left_and_right_top_and_bottom_halves_are_too_little() -> None:
+    row, column = np.indices((HEIGHT, WIDTH))
+    for missing in (column < WIDTH // 2, column >= WIDTH // 2, row < HEIGHT // 2, row >= HEIGHT // 2):
+        assert Gate()(without(room(), missing)) is not None
+        assert Gate()(without(room(opening=True), missing)) is not None
+
+
+def test_scattered_dropout_of_half_the_pixels_is_let_through() -> None:
+    lost = np.random.default_rng(0).random((HEIGHT, WIDTH)) < 0.5
+    assert Gate()(without(room(), lost)) is None
+    assert Gate()(without(room(opening=True), lost)) is None
+    assert "glass" in (Gate()(without(room(floor_m=3.2, opening=True), lost)) or "")
+
+
+def test_simulated_doors_pass_and_glass_doors_do_not(small_dataset: PreparedDataset) -> None:
+    gate = Gate()
+    refused_glass = 0
+    rows = small_dataset.rows[::5]  # all states
+    for row in rows:
+        frame = replay(unflatten(row))
+        assert gate(frame.points) is None
+        assert gate(frame.points.reshape(-1, 3)) is None
+        refused_glass += gate(glass(unflatten(row), frame)) is not None
+    assert refused_glass >= len(rows) - 1
+
+
+def test_small_flat_clouds_are_looked_through_too(small_dataset: PreparedDataset) -> None:
+    gate = Gate()
+    for row in small_dataset.rows[::5]:
+        frame = replay(unflatten(row))
+        torn = np.array(frame.points)
+        torn[:, WIDTH // 4 : 3 * WIDTH // 4] = np.nan
+        for step in (2, 4):
+            whole, holed = (
+                cloud[::step, ::step][is_measured(cloud[::step, ::step])] for cloud in (frame.points, torn)
+            )
+            assert gate(whole) is None
+            assert row["state"] == "open" or gate(holed) is not None
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"margin_share": 0.5}, {"max_hole_share": -1.0}, {"hole_height_share": math.nan}]
+)
+def test_shares_that_switch_a_condition_off_are_refused(wrong: dict[str, float]) -> None:
+    with pytest.raises(ConfigError, match=next(iter(wrong))):
+        Gate(**wrong)
+
+
+def test_a_door_that_is_not_open_never_becomes_open_by_losing_data(small_dataset: PreparedDataset) -> None:
+    predictor = Predictor.load("ogurob-pointnet2", points=512)
+    careless = Predictor(predictor.network, predictor.card, 512, gate=None)
+    wrong_without_gate = 0
+    shut = [sample for sample in small_dataset.rows if sample["state"] != "open"]
+    for number, sample in enumerate(shut[::5]):
+        frame = replay(unflatten(sample))
+        for fault in FAULTS.values():
+            cloud = fault(unflatten(sample), frame, np.random.default_rng(number))
+            answer = predictor(cloud)
+            assert answer.state is None or answer.state.label != "open"
+            assert (answer.state is None) == bool(answer.reason)
+            state = careless(cloud).state
+            wrong_without_gate += state is not None and state.label == "open"
+    assert wrong_without_gate > 0  # otherwise the gate had nothing to do
+
+
+@pytest.mark.skipif(not REAL.is_dir(), reason="recorded frames are not part of the project")
+def test_recorded_frames_pass() -> None:
+    refused = {}
+    for row in csv.DictReader((REAL / "index.csv").read_text(encoding="utf-8").splitlines()):
+        if row["file"].endswith(".png") and "8bit" not in row["file"]:
+            camera = Pinhole(*(float(row[name]) for name in ("fx", "fy", "cx", "cy")))
+            cloud = read_cloud(REAL / row["file"], ReadOptions(intrinsics=camera))
+            refused[row["file"]] = Gate()(cloud)
+    assert len(refused) >= 20
+    assert "behind the camera" in (Gate()(read_cloud(REAL / "room_01_openings.pcd")) or "")  # a lidar's
+    assert {name: reason for name, reason in refused.items() if reason is not None} == {}

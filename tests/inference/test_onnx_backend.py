@@ -1,0 +1,176 @@
+# SPDX-License-Identifier: Apache-2.0
+"""An exported file behind a `Predictor`, with torch and without."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import onnx
+import pytest
+from onnx import TensorProto, helper
+
+from doorstate.dataset.store import PreparedDataset
+from doorstate.errors import ConfigError, MissingExtraError, WeightsError
+from doorstate.inference.onnx_backend import OnnxBackend
+from doorstate.inference.predictor import Predictor
+from doorstate.networks import create_network
+from doorstate.networks.weights import WeightsCard, save_weights
+from doorstate.simulation.frames import replay
+from doorstate.simulation.manifest import unflatten
+from doorstate.types import Points
+
+Run = Callable[..., tuple[int, str, str]]
+DOCS = Path(__file__).resolve().parents[2] / "docs" / "onnx.md"
+BLOCKED = "import sys; sys.modules.update(torch=None, onnx=None, onnxscript=None); "
+
+
+@pytest.fixture(scope="module")
+def weights(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("onnx") / "pointnet.safetensors"
+    card = WeightsCard(network="pointnet", num_points=160, temperature=0.01)
+    save_weights(path, create_network("pointnet"), card)
+    return path
+
+
+@pytest.fixture(scope="module")
+def exported(weights: Path) -> Path:
+    """Made by the command in a process of its own, as users make it."""
+    path = weights.with_suffix(".onnx")
+    arguments = ["export", "pointnet", "--weights", weights, "--out", path, "--clouds", "3"]
+    call = [sys.executable, "-c", "from doorstate.cli import main; main()", *map(str, arguments)]
+    done = subprocess.run(call, text=True, capture_output=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    said = (
+        rf"{path}: \d+\.\d MB, opset 18, 160 points\n3 simulated clouds: largest difference .* \d\.\de-\d+, "
+    )
+    assert re.match(said, done.stdout)
+    return path
+
+
+@pytest.fixture(scope="module")
+def raw(small_dataset: PreparedDataset) -> list[Points]:
+    return [replay(unflatten(row)).points for row in small_dataset.rows[:3]]
+
+
+def run_without_torch(script: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-W", "error", "-c", BLOCKED + script], cwd=folder, text=True, capture_output=True
+    )
+
+
+def test_it_is_the_predictor_of_the_weights(exported: Path, weights: Path, raw: list[Points]) -> None:
+    half = raw[0].copy()
+    half[:, :320] = np.nan
+    clouds = [*raw, half, raw[1].reshape(-1, 3)]
+    file, torch = Predictor.load(exported), Predictor.load(weights)
+    file.warm_up()
+    for one, other in zip(file.batch(clouds), torch.batch(clouds), strict=True):
+        assert (one.state, one.points, one.reason) == (other.state, other.points, other.reason)
+        assert list(one.probabilities) == list(other.probabilities)
+        np.testing.assert_allclose(
+            list(one.probabilities.values()), list(other.probabilities.values()), atol=1e-4
+        )
+    assert file(half).state is None
+    assert Predictor.load(exported, gate=None)(half).state is not None
+
+
+def test_it_takes_the_points_it_was_exported_for(exported: Path) -> None:
+    assert Predictor.load(exported).points == Predictor.load(exported, 160).points == 160
+    assert Predictor.load(exported, budget_ms=0.001).points == 160, "there is nothing to choose"
+    with pytest.raises(ConfigError, match=r"256 points asked for, but the \.onnx file takes 160"):
+        Predictor.load(exported, 256)
+    few = np.random.default_rng(0).uniform(1, 3, (140, 3)).astype(np.float32)
+    said = Predictor.load(exported, gate=None)(few)
+    assert said.state is None
+    assert "140 distinct, but the .onnx file takes 160" in said.reason
+
+
+def test_threads_are_what_is_asked_for_or_what_the_environment_says(
+    exported: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def of(network: OnnxBackend) -> int:
+        return int(network._session.get_session_options().intra_op_num_threads)
+
+    monkeypatch.setenv("OMP_NUM_THREADS", "3")
+    assert (of(OnnxBackend(exported)), of(OnnxBackend(exported, threads=2))) == (3, 2)
+    monkeypatch.delenv("OMP_NUM_THREADS")
+    assert of(OnnxBackend(exported)) == 0
+
+
+def test_files_that_cannot_be_used_say_so(tmp_path: Path, exported: Path) -> None:
+    def refused(path: Path) -> str:
+        with pytest.raises(WeightsError) as caught:
+            Predictor.load(path)
+        assert "\n" not in str(caught.value)
+        return str(caught.value)
+
+    path = tmp_path / "door.onnx"
+    assert "no such weights file" in refused(path)
+    for damaged in (b"", b"garbage", exported.read_bytes()[:5000]):
+        path.write_bytes(damaged)
+        assert str(path) in refused(path)
+    value = helper.make_tensor_value_info("x", TensorProto.FLOAT, [1])
+    same = helper.make_tensor_value_info("y", TensorProto.FLOAT, [1])
+    graph = helper.make_graph([helper.make_node("Identity", ["x"], ["y"])], "foreign", [value], [same])
+    onnx.save(helper.make_model(graph, ir_version=10, opset_imports=[helper.make_opsetid("", 18)]), path)
+    assert "not a file of `doorstate export`" in refused(path)
+
+
+def test_without_onnxruntime_it_is_named(exported: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "onnxruntime", None)
+    with pytest.raises(MissingExtraError, match="pip install onnxruntime"):
+        Predictor.load(exported)
+
+
+def test_without_onnx_export_names_its_packages(
+    run: Run, weights: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "onnxscript", None)
+    out = tmp_path / "x.onnx"
+    code, _, err = run("export", "pointnet", "--weights", weights, "--out", out, "--clouds", 3)
+    assert (code, out.exists()) == (1, False)
+    assert err == "doorstate: export needs what is not installed: pip install onnx onnxscript onnxruntime\n"
+
+
+def test_export_refuses_what_does_not_fit(run: Run, weights: Path) -> None:
+    assert "weights of pointnet, not of dgcnn" in run("export", "dgcnn", "--weights", weights)[2]
+    assert "no weights for 'mvcnn' in the package" in run("export", "mvcnn")[2]
+    assert "by the ending .onnx" in run("export", "pointnet2", "--out", "x.pb")[2]
+
+
+def test_the_documented_python_runs_without_torch(
+    exported: Path, simulated_folder: Path, tmp_path: Path
+) -> None:
+    (example,) = re.findall(r"```python\n(.*?)```", DOCS.read_text(encoding="utf-8"), flags=re.DOTALL)
+    shutil.copy(exported, tmp_path / "pointnet2.onnx")
+    shutil.copy(sorted((simulated_folder / "pcd" / "open").glob("*.pcd"))[0], tmp_path / "cloud.pcd")
+    done = run_without_torch(example, tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert re.match(r"<DoorState\.\w+: \d> \{'closed': ", done.stdout)
+
+
+def test_predict_runs_without_torch(
+    exported: Path, weights: Path, simulated_folder: Path, tmp_path: Path
+) -> None:
+    cloud = sorted((simulated_folder / "pcd" / "open").glob("*.pcd"))[0]
+
+    def predict(file: Path) -> subprocess.CompletedProcess[str]:
+        arguments = ["doorstate", "predict", str(cloud), "--weights", str(file), "--json"]
+        return run_without_torch(
+            f"from doorstate.cli import main; sys.argv[:] = {arguments}; main()", tmp_path
+        )
+
+    done = predict(exported)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert json.loads(done.stdout)["points"] == 160
+    done = predict(weights)
+    assert done.returncode == 1
+    assert done.stderr.count("\n") == 1
+    assert "needs the package torch: install it, or give an .onnx file" in done.stderr

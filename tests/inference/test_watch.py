@@ -1,0 +1,276 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a robot says after each message: simulated doors as clouds and as depth images, by packaged weights."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from array import array
+from collections.abc import Iterator
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from doorstate.errors import ConfigError, WeightsError
+from doorstate.inference.predictor import Prediction, Predictor
+from doorstate.inference.rule_predictor import RulePredictor
+from doorstate.inference.stream import wait_for
+from doorstate.inference.watch import DoorReport, DoorWatch
+from doorstate.inference.watch_settings import WatchSettings, parse_settings
+from doorstate.io.depth import undo_roll
+from doorstate.io.readers import ReadOptions, points_in_body
+from doorstate.types import STATES, DoorState, Points
+
+POINTS = 512
+STEP = 4  # in the image: small clouds are quick
+OPTICAL = "camera_depth_optical_frame"
+START_NS = 1_700_000_000_123_456_789
+
+
+class Remembering(Predictor):
+    """Asks the network once about the same cloud."""
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        self._said: dict[bytes, Prediction] = {}
+
+    def __call__(self, points: Points) -> Prediction:
+        content = points.tobytes()
+        if content not in self._said:
+            self._said[content] = super().__call__(points)
+        return self._said[content]
+
+
+@pytest.fixture(scope="module")
+def predictor() -> Predictor:
+    return Remembering.load("ogurob-pointnet2", POINTS)  # the door of these frames
+
+
+@pytest.fixture(scope="module")
+def clouds(frames: list[Any]) -> list[Points]:
+    """Closed, semi-open, open, and nothing measured."""
+    small = [frame.points[::STEP, ::STEP] for frame in frames]
+    return [*small, np.full_like(small[0], np.nan)]
+
+
+def header(stamp_ns: int, frame_id: str) -> SimpleNamespace:
+    stamp = SimpleNamespace(sec=stamp_ns // 10**9, nanosec=stamp_ns % 10**9)
+    return SimpleNamespace(stamp=stamp, frame_id=frame_id)
+
+
+def cloud_message(points: Points, stamp_ns: int = START_NS, frame_id: str = "camera_link") -> SimpleNamespace:
+    height, width = points.shape[:2]
+    fields = [
+        SimpleNamespace(name=name, offset=4 * place, datatype=7, count=1) for place, name in enumerate("xyz")
+    ]
+    return SimpleNamespace(
+        header=header(stamp_ns, frame_id),
+        height=height,
+        width=width,
+        fields=fields,
+        is_bigendian=False,
+        point_step=12,
+        row_step=12 * width,
+        data=array("B", np.ascontiguousarray(points, "<f4").tobytes()),  # as rclpy holds it
+    )
+
+
+def image_message(pixels: NDArray[Any], encoding: str) -> SimpleNamespace:
+    height, width = pixels.shape
+    return SimpleNamespace(
+        header=header(START_NS, OPTICAL),
+        height=height,
+        width=width,
+        encoding=encoding,
+        is_bigendian=0,
+        step=width * pixels.itemsize,
+        data=array("B", pixels.tobytes()),
+    )
+
+
+def camera_message(fx: float) -> SimpleNamespace:
+    """Of every fourth row and column of a 640 x 480 image, in pixels of the whole one."""
+    k = [fx / STEP, 0, 319.5 / STEP, 0, fx / STEP, 239.5 / STEP, 0, 0, 1]
+    return SimpleNamespace(width=640 // STEP, height=480 // STEP, k=k, p=[0.0] * 12)
+
+
+def to_optical(points: Points) -> Points:
+    return np.stack((-points[..., 1], -points[..., 2], points[..., 0]), axis=-1)
+
+
+def at_10_hz(watch: DoorWatch, clouds: Iterator[Points] | list[Points]) -> list[DoorReport]:
+    return [
+        watch.answer(cloud_message(cloud, START_NS + number * 10**8), 0)
+        for number, cloud in enumerate(clouds)
+    ]
+
+
+def test_a_door_that_opens_is_open_when_waiting_would_be_over(
+    predictor: Predictor, clouds: list[Points]
+) -> None:
+    seen = [clouds[0]] * 8 + [clouds[2]] * 25
+    reports = at_10_hz(DoorWatch(WatchSettings(max_hz=0), predictor), seen)
+    assert reports[0].state == "unknown"
+    assert reports[7].state == "closed"
+    assert reports[-1].state == "open"
+    assert reports[-1].prediction.state is DoorState.OPEN
+    assert reports[-1].frame_id == "camera_link"
+    first = next(report.stamp_ns for report in reports if report.is_open)
+    stream = ((report.stamp_ns / 1e9, report.prediction) for report in reports)
+    assert wait_for("open", stream, 60.0, hold_s=1.0)
+    assert next(stream)[0] == pytest.approx(
+        first / 1e9 + 0.1
+    )  # the one after the frame that ended the waiting
+
+
+def test_missing_data_are_never_open(predictor: Predictor, clouds: list[Points]) -> None:
+    reports = at_10_hz(DoorWatch(WatchSettings(), predictor), [clouds[2]] * 25 + [clouds[3]] * 12)
+    assert reports[24].is_open
+    assert not any(report.is_open for report in reports[25:])
+    assert {report.values["raw_state"] for report in reports[25:]} == {"unknown"}
+    assert "all points are NaN" in reports[25].values["reason"]
+    # The filter alone would remember for two to three seconds; from silence_s on the state itself is unknown.
+    assert [report.state for report in reports[25:]] == ["open"] * 9 + ["unknown"] * 3
+
+
+def test_silence_is_unknown_and_forgets(predictor: Predictor, clouds: list[Points]) -> None:
+    watch = DoorWatch(WatchSettings(), predictor)
+    assert at_10_hz(watch, [clouds[2]] * 25)[-1].is_open
+    silence = watch.silence(START_NS + 4 * 10**9)
+    assert (silence.state, silence.is_open, silence.stamp_ns) == ("unknown", False, START_NS + 4 * 10**9)
+    assert silence.values["reason"] == "no message for 1 s"
+    assert silence.frame_id == "camera_link"
+    again = watch.answer(cloud_message(clouds[2], START_NS + 4 * 10**9), 0)
+    assert (again.state, again.values["raw_state"]) == ("unknown", "open")
+
+
+@pytest.mark.parametrize("roll_deg", [0, 90, 180, 270])
+@pytest.mark.parametrize(("frame", "frame_id", "optical"), [
+    ("auto", OPTICAL, True),
+    ("auto", "camera_link", False),
+    ("optical", "camera_link", True),
+    ("body", OPTICAL, False),
+])  # fmt: skip
+def test_frames_and_rolled_cameras_change_no_answer_and_places_come_back_in_them(
+    frame: str, frame_id: str, optical: bool, roll_deg: int, clouds: list[Points]
+) -> None:
+    settings = parse_settings({"frame": frame, "roll": roll_deg, "rule": "wall_leaf_angle"})
+    upright = DoorWatch(parse_settings({"rule": "wall_leaf_angle"})).answer(cloud_message(clouds[1]), 0)
+    rolled = undo_roll(clouds[1], (360 - roll_deg) % 360)
+    sent = to_optical(rolled) if optical else rolled
+    report = DoorWatch(settings).answer(cloud_message(sent, frame_id=frame_id), 0)
+    assert report.prediction.state is upright.prediction.state is DoorState.SEMI_OPEN
+    np.testing.assert_allclose(report.middle_m, np.nanmedian(sent.reshape(-1, 3), axis=0), atol=0.05)
+    assert (
+        [shape.name for shape in report.shapes]
+        == [shape.name for shape in upright.prediction.detections]
+        != []
+    )
+    options = ReadOptions("optical" if optical else "body", roll_deg)
+    for shape, found in zip(report.shapes, upright.prediction.detections, strict=True):
+        np.testing.assert_allclose(points_in_body(shape.points_m, options), found.points_m, atol=1e-3)
+
+
+def test_depth_images_need_their_camera_and_say_what_clouds_say(
+    predictor: Predictor, clouds: list[Points]
+) -> None:
+    expected = DoorWatch(WatchSettings(), predictor).answer(cloud_message(clouds[2]), 0)
+    depth_m = clouds[2][..., 0]  # along the viewing axis
+    watch = DoorWatch(WatchSettings(input="depth"), predictor)
+    assert watch.answer(image_message(depth_m, "32FC1"), 0).values["reason"] == "no CameraInfo has come yet"
+    watch.see_camera(camera_message(0.0))
+    assert "was the camera calibrated?" in watch.answer(image_message(depth_m, "32FC1"), 0).values["reason"]
+    watch.see_camera(camera_message(320 / np.tan(np.pi / 6)))
+    metres = watch.answer(image_message(depth_m, "32FC1"), 0)
+    assert metres.prediction.probabilities == pytest.approx(expected.prediction.probabilities, abs=1e-3)
+    millimetres = watch.answer(image_message(np.nan_to_num(depth_m * 1000).astype("<u2"), "16UC1"), 0)
+    assert millimetres.values["raw_state"] == "open"
+    np.testing.assert_allclose(metres.middle_m, to_optical(expected.middle_m), atol=1e-4)
+    assert "not depth" in watch.answer(image_message(depth_m, "rgb8"), 0).values["reason"]
+
+
+def test_what_cannot_be_read_is_unknown_and_ends_nothing(predictor: Predictor, clouds: list[Points]) -> None:
+    watch = DoorWatch(WatchSettings(), predictor)
+    broken = cloud_message(clouds[0])
+    broken.data = broken.data[:100]
+    assert "bytes" in watch.answer(broken, 0).values["reason"]
+    broken.data = "no bytes at all"
+    assert watch.answer(broken, 0).values["reason"].startswith("damaged message (")
+    assert watch.answer(cloud_message(clouds[0], 0), 5 * 10**9).stamp_ns == 5 * 10**9  # no stamp of its own
+    assert watch.answer(cloud_message(clouds[0]), 0).values["raw_state"] == "closed"
+    png = SimpleNamespace(
+        header=header(START_NS, OPTICAL), format="16UC1; compressedDepth png", data=bytes(20)
+    )
+    images = DoorWatch(WatchSettings(input="compressed_depth"), predictor)
+    images.see_camera(camera_message(554.0))
+    assert "PNG" in images.answer(png, 0).values["reason"]
+
+
+@pytest.mark.parametrize(
+    ("camera_hz", "max_hz", "answers"), [(30, 10, 10), (15, 10, 10), (9, 10, 9), (30, 0, 30)]
+)
+def test_no_more_answers_than_asked_for_and_no_fewer(camera_hz: int, max_hz: float, answers: int) -> None:
+    watch = DoorWatch(WatchSettings(max_hz=max_hz), RulePredictor.load("depth_region"))
+    due = [watch.is_due(1000 + number / camera_hz) for number in range(10 * camera_hz)]
+    assert sum(due) == pytest.approx(10 * answers, abs=1)
+
+
+def test_values_and_text_say_everything(clouds: list[Points]) -> None:
+    watch = DoorWatch(parse_settings({"rule": "wall_leaf_angle"}))
+    report = [watch.answer(cloud_message(clouds[1], START_NS + k * 4 * 10**8), 0) for k in range(4)][-1]
+    values = report.values
+    assert values["state"] == values["raw_state"] == "semi_open"
+    assert {name: float(values[name]) for name in STATES} == {"closed": 0, "semi_open": 1, "open": 0}
+    assert sum(float(values[f"smoothed_{name}"]) for name in STATES) == pytest.approx(1, abs=1e-5)
+    assert 15 < float(values["opening_angle_deg"]) < 65
+    assert 0 < float(values["held_s"]) <= 0.8
+    assert report.text == f"semi_open {float(values['smoothed_semi_open']):.0%}"
+    unknown = DoorWatch(WatchSettings(rule="depth_region")).silence(START_NS)
+    assert unknown.text == "unknown\nno message for 1 s"
+
+
+def test_parameters_choose_who_answers(weights: object) -> None:
+    assert DoorWatch(WatchSettings(points=POINTS)).answerer == "pointnet2, 512 points"
+    assert DoorWatch(WatchSettings(weights=str(weights))).answerer == "pointnet, 256 points"
+    assert DoorWatch(WatchSettings(rule="plane_state")).answerer == "rule plane_state"
+    assert WatchSettings(rule="plane_state", gate=False).load_predictor().gate is None
+    assert WatchSettings().load_predictor().gate is not None
+
+
+@pytest.mark.parametrize(("given", "said"), [
+    ({"ponits": 512}, "no parameter ponits: there are input, network"),
+    ({"points": "many"}, "parameter points = 'many': input should be a valid integer"),
+    ({"points": True}, "parameter points = True"),
+    ({"budget_ms": float("inf")}, "parameter budget_ms = inf"),
+    ({"frame": "map"}, "parameter frame = 'map': input should be 'auto', 'body' or 'optical'"),
+    ({"roll": 45}, "parameter roll = 45"),
+    ({"silence_s": 0.0}, "parameter silence_s = 0.0: input should be greater than 0"),
+])  # fmt: skip
+def test_a_wrong_parameter_is_one_line(given: dict[str, Any], said: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        parse_settings(given)
+    assert str(caught.value).startswith(said)
+
+
+def test_parameters_that_exclude_each_other_are_errors() -> None:
+    for both in ({"points": 512}, {"budget_ms": 33.0}):
+        with pytest.raises(ConfigError, match="leave points and time budget out"):
+            parse_settings({"rule": "plane_state"} | both).load_predictor()
+    with pytest.raises(ConfigError, match="one answers"):
+        parse_settings({"rule": "plane_state", "weights": "door.onnx"}).load_predictor()
+    with pytest.raises(ConfigError, match="give one of them"):
+        parse_settings({"points": 512, "budget_ms": 33}).load_predictor()
+    with pytest.raises(WeightsError, match="no such weights file"):
+        parse_settings({"weights": "nowhere.onnx"}).load_predictor()
+
+
+def test_a_rule_needs_no_torch_and_nothing_needs_ros() -> None:
+    code = (
+        "import sys; from doorstate.inference.watch import DoorWatch;"
+        "from doorstate.inference.watch_settings import WatchSettings;"
+        "DoorWatch(WatchSettings(rule='plane_state')); sys.exit(bool({'torch', 'rclpy'} & set(sys.modules)))"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)

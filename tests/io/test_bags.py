@@ -1,0 +1,391 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Bags of ROS 1 and ROS 2: rosbags writes, we read; frames, cameras, stamps, topics; damaged bags."""
+
+from __future__ import annotations
+
+import io
+import sqlite3
+import struct
+import sys
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from PIL import Image
+
+pytest.importorskip("rosbags")
+
+from benchmarks.bags import (
+    KINDS,
+    START_NS,
+    Message,
+    camera_info,
+    cloud,
+    compressed_image,
+    image,
+    text,
+    write_bag,
+)
+
+from doorstate.errors import CameraError, CloudReadError, DoorstateError, MissingExtraError
+from doorstate.io import bag_limits
+from doorstate.io.bags import BagTopic, StampedCloud, open_bag
+from doorstate.io.camera import Intrinsics, Pinhole
+from doorstate.io.depth import depth_to_points
+from doorstate.io.readers import ReadOptions
+
+ORGANIZED = np.random.default_rng(0).normal(2, 1, (6, 8, 3)).astype(np.float32)
+ORGANIZED[1, 2] = np.nan
+DEPTH_MM = np.random.default_rng(1).integers(500, 4000, (6, 8), dtype=np.uint16)
+DEPTH_MM[0, :2] = (0, 65535)
+DEPTH_M = np.where((DEPTH_MM == 0) | (DEPTH_MM == 65535), np.nan, DEPTH_MM / 1000)
+CAMERA = Intrinsics(8, 6, 7.0, 7.5, 3.5, 2.5)
+K = (7, 0, 3.5, 0, 7.5, 2.5, 0, 0, 1)
+P = (7, 0, 3.5, 0, 0, 7.5, 2.5, 0, 0, 0, 1, 0)
+INFO = camera_info("/depth/camera_info", 8, 6, K, P)
+PNG_PARAMETERS = struct.pack("<iff", 0, 0, 0)
+
+
+def read(
+    path: Path, name: str | None = None, options: ReadOptions | None = None, **more: Any
+) -> list[StampedCloud]:
+    with open_bag(path) as bag:
+        return list(bag.clouds(bag.choose(name), options or ReadOptions(), **more))
+
+
+def read_one(path: Path, options: ReadOptions | None = None, **more: Any) -> NDArray[np.float32]:
+    (only,) = read(path, None, options, **more)
+    if isinstance(only.cloud, DoorstateError):
+        raise only.cloud
+    return only.cloud
+
+
+def complaint(path: Path, name: str | None = None, **more: Any) -> str:
+    with pytest.raises(DoorstateError) as caught:
+        read(path, name, **more)
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+def png(pixels: NDArray[np.uint16]) -> bytes:
+    stream = io.BytesIO()
+    Image.fromarray(pixels).save(stream, "PNG")
+    return stream.getvalue()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_clouds_come_back_with_stamps_in_order(kind: str, tmp_path: Path) -> None:
+    flat = ORGANIZED.reshape(-1, 3)
+    messages = [
+        cloud("/points", ORGANIZED, START_NS + 100_000_000),
+        text("/chatter"),
+        cloud("/flat", flat),
+        cloud("/points", ORGANIZED + 1, START_NS + 200_000_000),
+    ]
+    path = write_bag(tmp_path, kind, messages)
+    with open_bag(path) as bag:
+        assert bag.topics == [
+            BagTopic("/chatter", "std_msgs/msg/String", 1),
+            BagTopic("/flat", "sensor_msgs/msg/PointCloud2", 1),
+            BagTopic("/points", "sensor_msgs/msg/PointCloud2", 2),
+        ]
+    first, second = read(path, "/points")
+    assert (first.stamp_s, second.stamp_s) == (1_700_000_000.1, 1_700_000_000.2)
+    assert first.frame_id == "camera_link"
+    np.testing.assert_array_equal(first.cloud, ORGANIZED)
+    np.testing.assert_array_equal(second.cloud, ORGANIZED + 1)
+    np.testing.assert_array_equal(read(path, "/flat")[0].cloud, flat)
+
+
+@pytest.mark.parametrize("kind", ["db3", "mcap"])
+def test_one_file_of_a_ros2_folder_is_enough(kind: str, tmp_path: Path) -> None:
+    folder = write_bag(tmp_path, kind, [cloud("/points", ORGANIZED)])
+    (folder / "metadata.yaml").unlink()
+    np.testing.assert_array_equal(read_one(folder / f"{folder.name}.{kind}"), ORGANIZED)
+    assert "has no metadata.yaml" in complaint(folder)
+
+
+COMPRESSED = [("bag", "LZ4"), ("bag", "BZ2"), ("db3", "MESSAGE"), ("mcap", "STORAGE")]
+
+
+@pytest.mark.parametrize(("kind", "compression"), [*COMPRESSED, ("db3", "FILE")])
+def test_compressed_bags_are_read(kind: str, compression: str, tmp_path: Path) -> None:
+    path = write_bag(tmp_path, kind, [cloud("/points", ORGANIZED)], compression)
+    np.testing.assert_array_equal(read_one(path), ORGANIZED)
+
+
+def test_one_file_of_a_folder_with_compressed_messages_is_enough(tmp_path: Path) -> None:
+    folder = write_bag(tmp_path, "db3", [cloud("/points", ORGANIZED)], "MESSAGE")
+    np.testing.assert_array_equal(read_one(folder / f"{folder.name}.db3"), ORGANIZED)
+
+
+@pytest.mark.parametrize(("kind", "compression"), COMPRESSED)
+def test_what_unpacks_to_more_than_a_message_holds_is_refused(
+    kind: str, compression: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = write_bag(tmp_path, kind, [cloud("/points", np.zeros((60, 80, 3)))], compression)
+    monkeypatch.setattr(bag_limits, "MAX_UNPACKED", 2000)
+    with pytest.raises(CloudReadError, match="unpacks to more than"):
+        read_one(path)
+
+
+@pytest.mark.parametrize(("kind", "compression"), COMPRESSED)
+def test_what_is_packed_must_end(
+    kind: str, compression: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = write_bag(tmp_path, kind, [cloud("/points", ORGANIZED)], compression)
+    unpack = bag_limits._unpack
+    monkeypatch.setattr(bag_limits, "_unpack", lambda new, packed: unpack(new, packed[:-5]))
+    with pytest.raises(CloudReadError, match="what is packed does not end"):
+        read_one(path)
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ("UPDATE messages SET timestamp = NULL", "damaged from here on"),
+        ("UPDATE messages SET timestamp = 'now'", "damaged, or no bag"),
+        ("UPDATE messages SET data = 'text'", "damaged message"),
+        ("UPDATE topics SET name = NULL WHERE name = '/points'", "none of its 1 topics"),
+        ("UPDATE topics SET type = 3", "none of its 2 topics"),
+        # A view computes whatever it likes, without end.
+        (
+            "DROP TABLE schema; CREATE VIEW schema AS WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n)"
+            " SELECT i AS schema_version FROM n WHERE i < 0",
+            "damaged, or no bag",
+        ),
+    ],
+)
+def test_a_database_holds_what_it_likes(change: str, reason: str, tmp_path: Path) -> None:
+    folder = write_bag(tmp_path, "db3", [cloud("/points", ORGANIZED), text("/chatter")])
+    file = folder / f"{folder.name}.db3"
+    with closing(sqlite3.connect(file)) as database:
+        database.executescript(_LOOSE + change)
+        database.commit()
+    with pytest.raises(CloudReadError, match=reason):
+        read_one(file)
+
+
+# The same tables as recorders make, without NOT NULL and types.
+_LOOSE = """
+CREATE TABLE new AS SELECT * FROM messages; DROP TABLE messages; ALTER TABLE new RENAME TO messages;
+CREATE TABLE new AS SELECT * FROM topics; DROP TABLE topics; ALTER TABLE new RENAME TO topics;
+"""
+
+
+@pytest.mark.parametrize(
+    "added", ["  x: [&a 1, *a]", "  x: &a [1]\n  y: {<<: *a}"], ids=["an alias", "a merge of one"]
+)
+def test_metadata_that_refer_to_themselves_are_refused(added: str, tmp_path: Path) -> None:
+    folder = write_bag(tmp_path, "mcap", [cloud("/points", ORGANIZED)])
+    metadata = folder / "metadata.yaml"
+    metadata.write_text(metadata.read_text() + f"{added}\n")
+    assert "refers to itself" in complaint(folder)
+
+
+def test_a_zero_stamp_gives_way_to_the_time_of_recording(tmp_path: Path) -> None:
+    path = write_bag(tmp_path, "mcap", [cloud("/points", ORGANIZED, 0)])
+    assert read(path)[0].stamp_s == 0.001
+
+
+def test_every_third_message(tmp_path: Path) -> None:
+    path = write_bag(tmp_path, "bag", [cloud("/points", ORGANIZED, START_NS + i * 10**9) for i in range(8)])
+    assert [found.stamp_s - START_NS / 1e9 for found in read(path, every=3)] == [0, 3, 6]
+
+
+def test_frame_roll_and_units_are_those_of_files(tmp_path: Path) -> None:
+    right, down, forward = 100.0, 200.0, 3000.0  # millimetres, of a camera turned clockwise
+    path = write_bag(tmp_path, "mcap", [cloud("/points", np.array([[right, down, forward]]))])
+    upright = read_one(path, ReadOptions(frame="optical", units_m=0.001))
+    np.testing.assert_allclose(upright, [[3, -0.1, -0.2]], rtol=1e-6)
+    turned = read_one(path, ReadOptions(frame="optical", units_m=0.001, roll_deg=90))
+    np.testing.assert_allclose(turned, [[3, 0.2, -0.1]], rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("kind", "pixels", "encoding"),
+    [
+        ("bag", DEPTH_MM, "16UC1"),
+        ("db3", DEPTH_MM.astype(">u2"), "mono16"),
+        ("mcap", DEPTH_M.astype("<f4"), "32FC1"),
+        ("bag", DEPTH_M.astype(">f4"), "32FC1"),
+    ],
+)
+def test_depth_images_take_the_camera_beside_them(
+    kind: str, pixels: NDArray[Any], encoding: str, tmp_path: Path
+) -> None:
+    path = write_bag(tmp_path, kind, [image("/depth/image_raw", pixels, encoding), INFO])
+    points = read_one(path)
+    np.testing.assert_allclose(points, depth_to_points(DEPTH_M, CAMERA), rtol=1e-6)
+    assert np.isnan(points[0, :2]).all()
+
+
+def test_rows_of_images_may_be_padded_and_scales_and_roll_are_taken(tmp_path: Path) -> None:
+    padded = np.pad(DEPTH_MM, ((0, 0), (0, 2)))
+    message = image("/depth/image_raw", padded, "16UC1", width=8)
+    path = write_bag(tmp_path, "mcap", [message, INFO])
+    points = read_one(path, ReadOptions(depth_scale_m=0.01, roll_deg=270))
+    np.testing.assert_allclose(points, depth_to_points(DEPTH_M * 10, CAMERA, 270), rtol=1e-6)
+
+
+def test_the_camera_may_be_named_or_given(tmp_path: Path) -> None:
+    other = camera_info("/other", 8, 6, (9, 0, 3, 0, 9, 2, 0, 0, 1), [0] * 12)
+    path = write_bag(tmp_path, "mcap", [image("/depth/image_raw", DEPTH_MM, "16UC1"), INFO, other])
+    with_k = depth_to_points(DEPTH_M, Intrinsics(8, 6, 9, 9, 3, 2))
+    np.testing.assert_allclose(read_one(path, camera_info_topic="/other"), with_k, rtol=1e-6)
+    for given in (Pinhole(9, 9, 3, 2), Intrinsics(8, 6, 9, 9, 3, 2)):
+        np.testing.assert_allclose(read_one(path, ReadOptions(intrinsics=given)), with_k, rtol=1e-6)
+
+
+def test_rectified_images_are_of_the_camera_p(tmp_path: Path) -> None:
+    info = camera_info("/depth/camera_info", 8, 6, K, (5, 0, 1, -0.3, 0, 6, 2, 0, 0, 0, 1, 0))
+    path = write_bag(tmp_path, "bag", [image("/depth/image_rect", DEPTH_MM, "16UC1"), info])
+    np.testing.assert_allclose(
+        read_one(path), depth_to_points(DEPTH_M, Intrinsics(8, 6, 5, 6, 1, 2)), rtol=1e-6
+    )
+
+
+@pytest.mark.parametrize("kind", ["bag", "mcap"])
+def test_compressed_depth_of_integers_is_lossless(kind: str, tmp_path: Path) -> None:
+    message = compressed_image(
+        "/depth/image_raw/compressedDepth", PNG_PARAMETERS + png(DEPTH_MM), "16UC1; compressedDepth png"
+    )
+    path = write_bag(tmp_path, kind, [message, INFO])
+    np.testing.assert_allclose(read_one(path), depth_to_points(DEPTH_M, CAMERA), rtol=1e-6)
+
+
+def test_compressed_depth_of_floats_is_inverse(tmp_path: Path) -> None:
+    # As compressed_depth_image_transport packs it: a = q (q + 1), b = 1 - a / farthest, stored = a / depth + b.
+    quant_a = 100.0 * 101.0
+    quant_b = 1 - quant_a / 10.0
+    stored = np.where(np.isfinite(DEPTH_M), quant_a / DEPTH_M + quant_b, 0).astype(np.uint16)
+    data = struct.pack("<iff", 0, quant_a, quant_b) + png(stored)
+    message = compressed_image("/depth/image_raw/compressedDepth", data, "32FC1; compressedDepth")
+    points = read_one(write_bag(tmp_path, "mcap", [message, INFO]))
+    np.testing.assert_allclose(points[..., 0], DEPTH_M, rtol=2e-3)
+
+
+def test_a_bag_with_one_usable_topic_needs_no_name(tmp_path: Path) -> None:
+    colour = image("/colour/image_raw", np.zeros((6, 24), np.uint8), "rgb8", width=8)
+    jpeg = compressed_image("/colour/image_raw/compressed", b"\xff\xd8", "rgb8; jpeg compressed bgr8")
+    path = write_bag(tmp_path, "mcap", [colour, jpeg, text("/chatter"), cloud("/points", ORGANIZED)])
+    np.testing.assert_array_equal(read_one(path), ORGANIZED)
+    wanted = "usable are: /points (PointCloud2, 1)"
+    for name, reason in (
+        ("/gone", "topic /gone is not in this bag"),
+        ("/chatter", "topic /chatter holds String messages"),
+        ("/colour/image_raw", "is an image in rgb8, not depth"),
+        ("/colour/image_raw/compressed", "not compressedDepth"),
+    ):
+        said = complaint(path, name)
+        assert reason in said
+        assert said.endswith(wanted)
+
+
+def test_several_usable_topics_are_listed(tmp_path: Path) -> None:
+    depth = image("/depth/image_raw", DEPTH_MM, "16UC1")
+    said = complaint(write_bag(tmp_path, "bag", [cloud("/points", ORGANIZED), depth, INFO]))
+    assert said == (
+        "test.bag: say by --topic which to read: /depth/image_raw (Image, 1), /points (PointCloud2, 1)"
+    )
+
+
+def test_no_usable_topic_is_said(tmp_path: Path) -> None:
+    rvl = compressed_image("/depth/compressedDepth", b"", "16UC1; compressedDepth rvl")
+    path = write_bag(tmp_path, "mcap", [text("/chatter"), rvl])
+    assert "none of its 2 topics holds clouds or depth images" in complaint(path)
+    assert "only PNG can be read" in complaint(path, "/depth/compressedDepth")
+
+
+@pytest.mark.parametrize(
+    ("info", "reason"),
+    [
+        (text("/depth/camera_info"), "no CameraInfo in /depth/camera_info"),
+        (camera_info("/elsewhere/camera_info", 8, 6, K, P), "no CameraInfo in /depth/camera_info"),
+        (camera_info("/depth/camera_info", 8, 6, [0] * 9, [0] * 12), "/depth/camera_info: fx = 0.0 pixels"),
+    ],
+)
+def test_depth_images_without_a_camera_are_one_line(info: Message, reason: str, tmp_path: Path) -> None:
+    path = write_bag(tmp_path, "mcap", [image("/depth/image_raw", DEPTH_MM, "16UC1"), info])
+    with pytest.raises(CameraError, match=reason):
+        read(path)
+
+
+@pytest.mark.parametrize(
+    ("bad", "reason"),
+    [
+        (cloud("/t", ORGANIZED, START_NS, point_step=0), "not within 0 bytes a point"),
+        (cloud("/t", ORGANIZED, START_NS, height=2**32 - 1), "not one camera frame"),
+        (image("/t", DEPTH_MM, "rgb8"), "is an image in rgb8"),
+        (
+            image("/t", DEPTH_MM, "16UC1", START_NS, height=7),
+            "is truncated: 112 bytes are declared, 96 are there",
+        ),
+        (image("/t", DEPTH_MM, "16UC1", START_NS, step=15), "6 rows of 8 pixels in 15 bytes"),
+        (image("/t", DEPTH_MM, "16UC1", START_NS, height=0), "is damaged: 0 rows"),
+        (image("/t", DEPTH_MM[:, :4], "16UC1", START_NS), "the image has 4 x 6 pixels"),
+        (compressed_image("/t", b"short", "16UC1; compressedDepth", START_NS), "is no PNG"),
+        (
+            compressed_image("/t", PNG_PARAMETERS + png(DEPTH_MM)[:-40], "16UC1; compressedDepth"),
+            "is a damaged PNG image",
+        ),
+    ],
+)
+def test_one_bad_message_is_no_end(bad: Message, reason: str, tmp_path: Path) -> None:
+    good = {
+        "PointCloud2": cloud("/t", ORGANIZED),
+        "Image": image("/t", DEPTH_MM, "16UC1"),
+        "CompressedImage": compressed_image(
+            "/t", PNG_PARAMETERS + png(DEPTH_MM), "16UC1; compressedDepth png"
+        ),
+    }[bad.type]
+    path = write_bag(tmp_path, "mcap", [good, bad, good, camera_info("/camera_info", 8, 6, K, P)])
+    before, broken, after = read(path, "/t")
+    assert isinstance(broken.cloud, DoorstateError)
+    assert reason in str(broken.cloud)
+    assert "\n" not in str(broken.cloud)
+    assert broken.stamp_s == START_NS / 1e9
+    np.testing.assert_array_equal(before.cloud, after.cloud)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("part", [0, 0.001, 0.5, 0.999])
+def test_a_truncated_bag_is_one_line(kind: str, part: float, tmp_path: Path) -> None:
+    clouds = [cloud("/points", np.ones((60, 80, 3)), START_NS + i) for i in range(4)]
+    path = write_bag(tmp_path, kind, clouds)
+    file = path if path.is_file() else path / f"{path.name}.{kind}"
+    content = file.read_bytes()
+    file.write_bytes(content[: int(part * len(content))])
+    assert complaint(path, "/points").startswith(f"{path.name}: damaged")
+
+
+def test_messages_before_the_damage_are_read(tmp_path: Path) -> None:
+    path = write_bag(tmp_path, "bag", [cloud("/points", ORGANIZED, START_NS + i) for i in range(3)])
+    first, second, *rest = path.read_bytes().split(b"op=\x02")  # the records that hold messages
+    path.write_bytes(b"op=\x02".join([first, second]) + b"op=\x09" + b"op=\x02".join(rest))
+    with open_bag(path) as bag:
+        clouds = bag.clouds(bag.choose("/points"))
+        assert isinstance(next(clouds).cloud, np.ndarray)
+        with pytest.raises(CloudReadError, match="damaged from here on"):
+            list(clouds)
+
+
+def test_what_is_no_bag_is_one_line(tmp_path: Path) -> None:
+    assert "no such file" in complaint(tmp_path / "gone.bag")
+    (tmp_path / "cloud.pcd").write_bytes(b"")
+    assert "give a .bag, .db3 or .mcap file" in complaint(tmp_path / "cloud.pcd")
+    for name in ("a.bag", "a.db3", "a.mcap"):
+        (tmp_path / name).write_bytes(b"garbage" * 1000)
+        assert f"{name}: damaged, or no bag" in complaint(tmp_path / name)
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "folder" / "metadata.yaml").write_text("[")
+    assert "folder: damaged, or no bag" in complaint(tmp_path / "folder")
+
+
+def test_without_rosbags_it_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "rosbags.rosbag1", None)
+    with pytest.raises(MissingExtraError, match="pip install rosbags"):
+        read(tmp_path / "a.bag")

@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: Apache-2.0
+"""PLY: files by trimesh and by hand, in all encodings, with whatever may stand around the vertices."""
+
+from __future__ import annotations
+
+import struct
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as npst
+from numpy.typing import NDArray
+
+from doorstate.errors import CloudReadError
+from doorstate.io.ply import parse_ply
+
+NAN = np.nan
+POINTS = np.array([[1.5, -2.25, 3.125], [NAN, NAN, NAN], [0.5, 0.25, -8.0]], np.float32)
+ROWS = "1.5 -2.25 3.125\nnan nan nan\n0.5 0.25 -8\n"
+XYZ = "property float x\nproperty float y\nproperty float z\n"
+
+
+def _header(encoding: str, elements: str) -> bytes:
+    return f"ply\nformat {encoding} 1.0\ncomment by hand\n{elements}end_header\n".encode()
+
+
+VERTICES = f"element vertex 3\n{XYZ}"
+FACES = "element face 2\nproperty list uchar int vertex_indices\n"
+MIXED_FACES = struct.pack("<B3i", 3, 0, 1, 2) + struct.pack("<B4i", 4, 0, 1, 2, 0)
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "binary_little_endian"])
+def test_reads_what_trimesh_writes(encoding: str) -> None:
+    vertices = np.array([[0, 0, 0], [1.5, 0, 0], [0, 2.5, 0.25], [0, 0, 0]], np.float32)
+    colours = np.array([[1, 2, 3, 255]] * 4, np.uint8)
+    cloud = trimesh.PointCloud(vertices, colors=colours)  # type: ignore[no-untyped-call]
+    mesh = trimesh.Trimesh(vertices, [[0, 1, 2], [3, 1, 2]], process=False)
+    for thing in (cloud, mesh):
+        data = thing.export(file_type="ply", encoding=encoding)
+        assert isinstance(data, bytes)
+        np.testing.assert_array_equal(parse_ply(data), vertices)
+
+
+@given(npst.arrays(np.float32, st.tuples(st.integers(0, 12), st.just(3)), elements=st.floats(width=32)))
+@settings(deadline=None, max_examples=50)
+def test_every_float32_survives_every_encoding(points: NDArray[np.float32]) -> None:
+    elements = VERTICES.replace("3", str(len(points)))
+    rows = "".join(" ".join(f"{value:.9g}" for value in row) + "\n" for row in points.tolist())
+    for data in (
+        _header("ascii", elements) + rows.encode(),
+        _header("binary_little_endian", elements) + points.astype("<f4").tobytes(),
+        _header("binary_big_endian", elements) + points.astype(">f4").tobytes(),
+    ):
+        np.testing.assert_array_equal(parse_ply(data).astype(np.float32), points)
+
+
+@pytest.mark.parametrize(("encoding", "order"), [("binary_little_endian", "<"), ("binary_big_endian", ">")])
+def test_other_properties_and_elements_are_passed_over(encoding: str, order: str) -> None:
+    elements = (
+        "obj_info made by hand\nelement camera 2\nproperty double f\nproperty uchar id\nelement vertex 3\n"
+        "property uchar red\nproperty double z\nproperty float32 x\nproperty int16 label\nproperty float y\n"
+        + FACES
+    )
+    cameras = np.zeros(2, [("f", f"{order}f8"), ("id", "u1")])
+    kinds = {"red": "u1", "z": f"{order}f8", "x": f"{order}f4", "label": f"{order}i2", "y": f"{order}f4"}
+    vertices = np.zeros(3, list(kinds.items()))
+    vertices["x"], vertices["y"], vertices["z"] = POINTS.T
+    data = _header(encoding, elements) + cameras.tobytes() + vertices.tobytes() + MIXED_FACES
+    np.testing.assert_array_equal(parse_ply(data), POINTS)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        _header("ascii", VERTICES) + ROWS.encode(),
+        _header("ascii", VERTICES).replace(b"\n", b"\r\n") + ROWS.replace("\n", " \r\n").encode(),
+        _header("ascii", FACES + VERTICES) + b"3 0 1 2\n4 0 1 2 0\n" + ROWS.encode(),
+        _header("ascii", VERTICES + FACES) + ROWS.encode() + b"3 0 1 2\n4 0 1 2 0\n",
+        _header("binary_little_endian", VERTICES) + POINTS.tobytes() + b"\n",
+        _header("binary_little_endian", VERTICES).replace(b"\n", b"\r\n") + POINTS.tobytes(),
+    ],
+    ids=["plain", "crlf", "faces first", "faces after", "trailing byte", "binary crlf"],
+)
+def test_variants(data: bytes) -> None:
+    np.testing.assert_array_equal(parse_ply(data), POINTS)
+
+
+@pytest.mark.parametrize(
+    ("data", "reason"),
+    [
+        (b"plywood", "is no PLY file"),
+        (b"ply\nformat ascii 1.0\nelement vertex 3\n", "is no PLY file"),
+        (_header("ascii", FACES), "no element vertex"),
+        (_header("middle_endian", VERTICES), "no line format"),
+        (_header("ascii", VERTICES.replace("float z", "float w")), "x, y, w: x, y and z are needed"),
+        (_header("ascii", VERTICES.replace("float z", "quad z")), "quad values"),
+        (_header("ascii", VERTICES.replace("float x", "list uchar int k\nproperty float x")), "list values"),
+        (_header("ascii", VERTICES) + b"1 2 3\n4 5 6\n", "3 points are declared, 2 are there"),
+        (_header("ascii", VERTICES) + b"1 2 3\n4 5\n6 7 8\n", "rows of numbers"),
+        (_header("binary_big_endian", VERTICES) + bytes(35), "36 bytes are declared, 35 are there"),
+        (_header("binary_little_endian", FACES + VERTICES) + MIXED_FACES + bytes(36), "list values"),
+        (_header("binary_little_endian", VERTICES.replace("3", "9" * 15)) + bytes(36), "truncated"),
+    ],
+)
+def test_damaged_files_say_what_is_wrong(data: bytes, reason: str) -> None:
+    with pytest.raises(CloudReadError, match=reason):
+        parse_ply(data)

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Weights survive the file, and a file that does not fit says so."""
+
+from __future__ import annotations
+
+import pickle
+from pathlib import Path
+
+import pytest
+import torch
+from safetensors.torch import save_file
+
+from doorstate.errors import WeightsError
+from doorstate.networks import create_network, list_networks
+from doorstate.networks.weights import WeightsCard, load_weights, read_card, save_weights
+
+
+@pytest.mark.parametrize("name", list_networks())
+def test_a_network_comes_back_as_it_was(name: str, tmp_path: Path) -> None:
+    network = create_network(name, batchnorm_eps=1e-3).eval()
+    card = WeightsCard(network=name, network_options={"batchnorm_eps": 1e-3}, num_points=256)
+    save_weights(tmp_path / "w.safetensors", network, card)
+    loaded, found = load_weights(tmp_path / "w.safetensors")
+    points = torch.rand(2, 256, 3)
+    with torch.no_grad():
+        torch.testing.assert_close(loaded(points), network(points), rtol=0, atol=0)
+    assert found == card
+    assert not loaded.training
+
+
+def test_half_precision_halves_the_file_and_hardly_changes_the_answer(tmp_path: Path) -> None:
+    network = create_network("pointnet2").eval()
+    card = WeightsCard(network="pointnet2", num_points=256)
+    save_weights(tmp_path / "full.safetensors", network, card)
+    save_weights(tmp_path / "half.safetensors", network, card, half=True)
+    sizes = [(tmp_path / f"{name}.safetensors").stat().st_size for name in ("half", "full")]
+    assert sizes[0] < 0.55 * sizes[1]
+    loaded, _ = load_weights(tmp_path / "half.safetensors")
+    assert all(p.dtype == torch.float32 for p in loaded.parameters())
+    points = torch.rand(2, 256, 3)
+    with torch.no_grad():
+        torch.testing.assert_close(loaded(points).softmax(1), network(points).softmax(1), rtol=0, atol=5e-3)
+
+
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(WeightsError, match=r"gone\.safetensors: no such weights file"):
+        read_card(tmp_path / "gone.safetensors")
+
+
+@pytest.mark.parametrize("data", [b"", b"{}", b"\xff" * 100, pickle.dumps({"a": 1})])
+def test_what_is_no_safetensors_is_refused(data: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "w.safetensors"
+    path.write_bytes(data)
+    with pytest.raises(WeightsError, match="cannot be read as safetensors"):
+        load_weights(path)
+
+
+def test_somebody_elses_safetensors_are_refused(tmp_path: Path) -> None:
+    save_file({"a": torch.zeros(1)}, tmp_path / "w.safetensors")
+    with pytest.raises(WeightsError, match="no weights of doorstate"):
+        load_weights(tmp_path / "w.safetensors")
+
+
+def test_weights_of_another_network_do_not_fit(tmp_path: Path) -> None:
+    save_weights(
+        tmp_path / "w.safetensors", create_network("pointnet"), WeightsCard(network="dgcnn", num_points=256)
+    )
+    with pytest.raises(WeightsError, match="does not fit network dgcnn"):
+        load_weights(tmp_path / "w.safetensors")
+
+
+def test_other_states_or_scale_are_refused(tmp_path: Path) -> None:
+    card = WeightsCard(network="pointnet", num_points=256, scale_m=1.0)
+    save_weights(tmp_path / "w.safetensors", create_network("pointnet"), card)
+    with pytest.raises(WeightsError, match=r"at scale 1\.0 m"):
+        load_weights(tmp_path / "w.safetensors")

@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Files appear whole or not at all, and tables come back as they were written."""
+
+from __future__ import annotations
+
+import errno
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from doorstate._files import atomic_path, check_writable, is_vacant, read_csv, write_csv, write_text
+from doorstate.errors import DatasetError, OutputError
+
+
+def test_the_target_appears_when_the_block_ends(tmp_path: Path) -> None:
+    target = tmp_path / "new" / "folder" / "array.npy"
+    with atomic_path(target) as temporary:
+        assert temporary.parent == target.parent
+        np.save(temporary, np.arange(3))  # adds .npy to any other ending
+        assert not target.exists()
+    assert list(target.parent.iterdir()) == [target]
+    np.testing.assert_array_equal(np.load(target), [0, 1, 2])
+
+
+@pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt])
+def test_an_error_leaves_the_old_file_and_nothing_half_written(
+    tmp_path: Path, error: type[BaseException]
+) -> None:
+    target = tmp_path / "text.txt"
+    write_text(target, "old")
+
+    def write_half() -> None:
+        with atomic_path(target) as temporary:
+            temporary.write_text("ne", encoding="utf-8")
+            raise error
+
+    with pytest.raises(error):
+        write_half()
+    assert target.read_text(encoding="utf-8") == "old"
+    assert list(tmp_path.iterdir()) == [target]
+
+
+def test_a_block_that_writes_nothing_is_an_error_and_keeps_the_old_file(tmp_path: Path) -> None:
+    target = tmp_path / "text.txt"
+    write_text(target, "old")
+    with pytest.raises(FileNotFoundError), atomic_path(target):
+        pass
+    assert target.read_text(encoding="utf-8") == "old"
+
+
+def test_where_nothing_can_be_written_is_one_line_before_and_when_it_is_tried(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    for target in (tmp_path / "file" / "page.html", tmp_path):
+        with pytest.raises(OutputError, match="cannot be written"):
+            check_writable(target)
+        with pytest.raises(OutputError, match="cannot be written"):
+            write_text(target, "text")
+
+
+def test_asking_whether_something_can_be_written_makes_nothing(tmp_path: Path) -> None:
+    check_writable(tmp_path / "new" / "folder" / "page.html")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_full_disk_is_one_line_and_another_missing_file_is_itself(tmp_path: Path) -> None:
+    refused = pytest.raises(OutputError, match=r"a\.txt: cannot be written \(No space left on device\)")
+    with refused, atomic_path(tmp_path / "a.txt"):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    with pytest.raises(PermissionError), atomic_path(tmp_path / "a.txt"):
+        raise PermissionError(errno.EACCES, "denied", "another.txt")
+
+
+def test_text_is_utf_8_whatever_the_locale(tmp_path: Path) -> None:
+    write_text(tmp_path / "a.txt", "yarı açık kapı")
+    assert (tmp_path / "a.txt").read_bytes() == "yarı açık kapı".encode()
+
+
+def test_a_folder_is_vacant_until_something_whole_is_in_it(tmp_path: Path) -> None:
+    assert is_vacant(tmp_path / "new")
+    (tmp_path / ".123.tmp.manifest.csv").touch()
+    assert is_vacant(tmp_path)
+    (tmp_path / "notes.txt").touch()
+    assert not is_vacant(tmp_path)
+    assert not is_vacant(tmp_path / "notes.txt")
+
+
+def test_rows_of_different_columns_share_one_header(tmp_path: Path) -> None:
+    write_csv(tmp_path / "a.csv", [{"a": "1"}, {"b": 'two, "2"', "a": "line\nbreak"}])
+    assert read_csv(tmp_path / "a.csv") == [{"a": "1", "b": ""}, {"a": "line\nbreak", "b": 'two, "2"'}]
+
+
+@pytest.mark.parametrize(
+    "content",
+    [None, b"a,b\n1\n", b"a,b\n1,2,3\n", b"a,b\n\xff\xfe,2\n", b'a,b\n"1"2,3\n'],
+    ids=["missing", "short", "long", "not UTF-8", "stray quote"],
+)
+def test_a_file_that_is_no_such_table_is_refused_by_name(tmp_path: Path, content: bytes | None) -> None:
+    path = tmp_path / "manifest.csv"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(DatasetError, match=r"manifest\.csv: "):
+        read_csv(path)
+
+
+def test_a_table_saved_by_a_spreadsheet_has_the_same_columns(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("file,state\na.pcd,open\n", encoding="utf-8-sig")
+    assert read_csv(tmp_path / "a.csv") == [{"file": "a.pcd", "state": "open"}]
