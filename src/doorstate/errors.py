@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Everything that can go wrong for a user, as one tree; the command line is the only catcher.
+"""Errors that a user can cause, as one tree; commands, service and node catch them and word them in their own terms.
 
 DoorstateError
 ├── CloudError             one input file or array cannot be used
@@ -10,32 +10,100 @@ DoorstateError
 ├── ConfigError            an option or experiment file asks for something that does not exist
 ├── DatasetError           a data set folder is missing, incomplete or inconsistent
 ├── RunError               a training run or comparison folder cannot be used or continued
-├── WeightsError           a weights file is missing, damaged, or made for something else
-├── ExportError            a network cannot be exported, or the file would answer otherwise
-├── OutputError            a file cannot be written where it was asked for
+├── WeightsError           a weights file is missing, damaged, or made for another network
+├── ExportError            a network cannot be exported, or the exported file disagrees with it
+├── OutputError            a file cannot be written
 └── MissingExtraError      an optional package is needed and not installed
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterable, Mapping
+from functools import partial
+from typing import TYPE_CHECKING, Any, Self
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from pathlib import Path
 
     from pydantic import ValidationError
 
-MAX_MESSAGE_LENGTH = 1000  # letters: a file may name a million fields
-_LONGEST_REASON = 160
+MAX_MESSAGE_LENGTH = 1000  # characters; a file may name a million fields
+_MAX_REASON_LENGTH = 160
+
+WriteParameter = Callable[[str, object], str]
+"""Writes a parameter's name, and the value to give it unless that is None, as a surface spells them."""
+
+
+def python_parameter(name: str, value: object = None) -> str:
+    """Write a parameter as a Python keyword argument."""
+    return name if value is None else f"{name}={value!r}"
 
 
 class DoorstateError(Exception):
-    """Root of the tree; `str(error)` is one line that says what was wrong, where, and what to do."""
+    """Base of all errors of this package.
+
+    Args:
+        message: what is wrong, in words that name no command and no option.
+        path: file or folder it is wrong with.
+        field: parameter, column or key it is wrong with, by its name in Python or in the file.
+        expected: what would be accepted instead.
+        hint: what to do about it, in words that every surface can use.
+        suggestions: parameters by name and the values to try, such as `{"frame": "optical"}`.
+    """
+
+    def __init__(
+        self,
+        message: str,
+        *,
+        path: str | Path | None = None,
+        field: str | None = None,
+        expected: str | None = None,
+        hint: str | None = None,
+        suggestions: Mapping[str, object] | None = None,
+    ) -> None:
+        super().__init__(message)
+        self.message = message
+        self.path = path
+        self.field = field
+        self.expected = expected
+        self.hint = hint
+        self.suggestions = dict(suggestions or {})
 
     def __str__(self) -> str:
+        return self.describe()
+
+    def describe(self, parameter: WriteParameter = python_parameter, *, with_path: bool = True) -> str:
+        """Return one printable line: place, problem, what is expected, what to do.
+
+        Args:
+            parameter: how the surface writes parameters.
+            with_path: start with the path, where there is one.
+        """
+        place = [] if self.path is None or not with_path else [str(self.path)]
+        if self.field is not None:
+            # A key of a file is written as in the file, anything else as the surface writes parameters.
+            place.append(self.field if self.path is not None else parameter(self.field, None))
+        tries = " ".join(parameter(name, value) for name, value in self.suggestions.items())
+        advice = [
+            self.expected and f"expected {self.expected}",
+            self.hint,
+            tries and f"try {tries}",
+        ]
+        line = "; ".join([": ".join([*place, self.message]), *filter(None, advice)])
         # Files name their parts, and files have names: line breaks and terminal escapes among them.
-        line = "".join(letter if letter.isprintable() else " " for letter in super().__str__())
+        line = "".join(character if character.isprintable() else " " for character in line)
         return line if len(line) <= MAX_MESSAGE_LENGTH else f"{line[: MAX_MESSAGE_LENGTH - 3]}..."
+
+    def located(self, path: str | Path) -> Self:
+        """Return the same error, of a file or folder that the code which raised it did not know."""
+        return type(self)(self.message, **self._fields() | {"path": path})
+
+    def _fields(self) -> dict[str, Any]:
+        names = ("path", "field", "expected", "hint", "suggestions")
+        return {name: getattr(self, name) for name in names}
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return partial(type(self), self.message, **self._fields()), ()
 
 
 class CloudError(DoorstateError):
@@ -43,15 +111,15 @@ class CloudError(DoorstateError):
 
 
 class CloudReadError(CloudError):
-    """The bytes could not be read as a cloud."""
+    """The bytes cannot be read as a cloud."""
 
 
 class CloudContentError(CloudError):
-    """The cloud was read, but holds nothing a door's state can be told from."""
+    """The cloud can be read, but not used: wrong shape, unit or frame."""
 
 
 class TooFewPointsError(CloudContentError):
-    """Too little was measured: a moment of the camera's, and not how its clouds are read."""
+    """Too little was measured, for the moment; other clouds of the same camera may be fine."""
 
 
 class CameraError(DoorstateError):
@@ -75,30 +143,32 @@ class WeightsError(DoorstateError):
 
 
 class ExportError(DoorstateError):
-    """A network cannot be exported, or the file would answer otherwise."""
+    """A network cannot be exported, or the exported file disagrees with it."""
 
 
 class OutputError(DoorstateError):
-    """A file cannot be written where it was asked for."""
+    """A file cannot be written."""
 
 
 class MissingExtraError(DoorstateError):
     """An optional package is needed and not installed."""
 
 
-def missing_extra(what: str, *packages: str) -> MissingExtraError:
-    """What cannot be done, and how it can: by the packages' own names, as doorstate is on no index."""
-    return MissingExtraError(f"{what} needs what is not installed: pip install {' '.join(packages)}")
+def missing_extra(feature: str, *packages: str) -> MissingExtraError:
+    """Return the error of a feature whose packages are not installed."""
+    return MissingExtraError(
+        f"{feature} needs packages that are not installed: pip install {' '.join(packages)}"
+    )
 
 
 def first_validation_error(error: ValidationError, fields: Iterable[str] = ()) -> str:
-    """Where the first problem of values lies, if not in the whole, and what it is; with all fields if one is wrong."""
+    """Return the place and text of the first problem, and all known fields if one is missing or unknown."""
     problem = error.errors()[0]
-    told = ": ".join(filter(None, [".".join(map(str, problem["loc"])), problem["msg"]]))
-    named = ", ".join(fields) if problem["type"] in ("missing", "extra_forbidden") else ""
-    return f"{told}; fields are {named}" if named else told
+    text = ": ".join(filter(None, [".".join(map(str, problem["loc"])), problem["msg"]]))
+    known = ", ".join(fields) if problem["type"] in ("missing", "extra_forbidden") else ""
+    return f"{text}; fields are {known}" if known else text
 
 
 def summarize_exception(error: Exception) -> str:
-    """What another library says, in one line that is not long."""
-    return " ".join(f"{type(error).__name__}: {error}".split())[:_LONGEST_REASON]
+    """Return the type and text of another library's exception, in one short line."""
+    return " ".join(f"{type(error).__name__}: {error}".split())[:_MAX_REASON_LENGTH]
