@@ -19,7 +19,7 @@ from benchmarks.bags import START_NS, Message, camera_info, cloud, image, write_
 from doorstate.networks import create_network
 from doorstate.networks.weights import WeightsCard, save_weights
 from doorstate.types import STATES
-from hand_made_clouds import image_of_a_rough_wall
+from tests.hand_made_clouds import image_of_a_rough_wall
 
 Run = Callable[..., tuple[int, str, str]]
 POINTS = image_of_a_rough_wall(20, 25)

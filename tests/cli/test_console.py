@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from doorstate import console
+from doorstate.cli import console
 from doorstate.training.comparison import Run
 from doorstate.training.recipes import Recipe, Stage
 from doorstate.training.run_folder import RunFolder

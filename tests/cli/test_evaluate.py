@@ -16,7 +16,7 @@ from doorstate._files import write_csv
 from doorstate.simulation.frames import replay
 from doorstate.simulation.generate import PRESETS, draw_pose
 from doorstate.types import ABSTAINED
-from headless_chromium import Browser
+from tests.headless_chromium import Browser
 
 Run = Callable[..., tuple[int, str, str]]
 

@@ -18,8 +18,8 @@ from urllib.parse import unquote, urlsplit
 import numpy as np
 import pytest
 
-from doorstate.cli import viewing
-from hand_made_clouds import image_of_a_rough_wall
+from doorstate.cli import view as viewing
+from tests.hand_made_clouds import image_of_a_rough_wall
 
 Run = Callable[..., tuple[int, str, str]]
 CLOUD = image_of_a_rough_wall(20, 25)

@@ -12,7 +12,7 @@ from doorstate.clouds.preparation import MIN_POINTS, check_one_cloud, is_image, 
 from doorstate.clouds.sampling import farthest_point_indices
 from doorstate.errors import CloudContentError
 from doorstate.types import Points
-from hand_made_clouds import image_of_a_rough_wall
+from tests.hand_made_clouds import image_of_a_rough_wall
 
 NAN, INF = np.nan, np.inf
 

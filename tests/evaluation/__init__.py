@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A package, so that file names may repeat those of other rooms' tests."""
+"""Tests of doorstate.evaluation."""

@@ -26,7 +26,7 @@ from doorstate.networks.weights import WeightsCard, save_weights
 from doorstate.simulation.frames import replay
 from doorstate.simulation.manifest import unflatten
 from doorstate.types import STATES
-from hand_made_clouds import image_of_a_rough_wall
+from tests.hand_made_clouds import image_of_a_rough_wall
 
 
 @pytest.fixture(scope="module")

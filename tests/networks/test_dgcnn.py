@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import copy
 
-import plain
 import pytest
 import torch
 from torch import Tensor, nn
@@ -13,6 +12,7 @@ from torch import Tensor, nn
 from doorstate.networks.dgcnn import DGCNN, EdgeConv, edge_moments
 from doorstate.networks.kernels.ops import gather_rows
 from doorstate.networks.kernels.search import knn
+from tests.networks import plain
 
 
 def clouds(batch: int = 2, num_points: int = 128) -> Tensor:

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import copy
 
-import plain
 import pytest
 import torch
 from torch import Tensor, nn
@@ -13,6 +12,7 @@ from torch import Tensor, nn
 from doorstate.networks.kernels.ops import gather_rows
 from doorstate.networks.kernels.search import ball_query
 from doorstate.networks.layers import Dense, DenseMax, PointLinear, PooledMLP, RowBatchNorm, set_batchnorm
+from tests.networks import plain
 
 DTYPES = [torch.float64, torch.float32]
 

@@ -10,12 +10,12 @@ from typing import Any, NamedTuple
 
 import pytest
 import torch
-from plain_networks import PlainForm
 from torch import Tensor, nn
 
 from doorstate.networks import create_network
 from doorstate.networks.base import PointNetwork
 from doorstate.networks.layers import set_batchnorm
+from tests.networks.plain_networks import PlainForm
 
 CASES: dict[str, tuple[str, dict[str, Any]]] = {
     "pointnet": ("pointnet", {}),

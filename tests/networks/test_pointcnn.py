@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-import plain
 import pytest
 import torch
 from torch import Tensor, nn
 
 from doorstate.networks.kernels.search import knn
 from doorstate.networks.pointcnn import Level, PointCNN, XConv
+from tests.networks import plain
 
 
 def clouds(batch: int = 2, num_points: int = 128) -> Tensor:

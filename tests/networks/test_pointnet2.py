@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-import plain
 import pytest
 import torch
 from torch import Tensor, nn
 
 from doorstate.errors import ConfigError
 from doorstate.networks.pointnet2 import VARIANTS, PointNet2, Scale, SetAbstraction
+from tests.networks import plain
 
 SCALES = (Scale(0.5, 4, (6, 7, 8)), Scale(1, 8, (5, 6, 9)))
 

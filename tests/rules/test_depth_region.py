@@ -5,12 +5,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hand_made import Rectangle, door, see
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from doorstate.rules.depth_region import DepthRegionParameters, DepthRegionRule
 from doorstate.types import DoorState
+from tests.rules.hand_made import Rectangle, door, see
 
 RULE = DepthRegionRule()
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hand_made import door, see
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from doorstate.rules import create_rule, list_rules
+from tests.rules.hand_made import door, see
 
 
 @pytest.mark.parametrize("name", list_rules())

@@ -5,12 +5,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hand_made import door, edge_on_deg, see
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from doorstate.rules.plane_state import PlaneStateRule
 from doorstate.types import DoorState
+from tests.rules.hand_made import door, edge_on_deg, see
 
 RULE = PlaneStateRule()
 

@@ -7,7 +7,6 @@ import hashlib
 import math
 from pathlib import Path
 
-import naive_caster
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -22,6 +21,7 @@ from doorstate.simulation.placement import half_ring
 from doorstate.simulation.scene import Box, build_scene
 from doorstate.simulation.sensor import CameraPose, DepthCamera
 from doorstate.types import STATES, Part
+from tests.simulation import naive_caster
 
 OGUROB, AWAY = PRESETS["ogurob"], PRESETS["ogurob-away"]
 AHEAD = half_ring().index((0, 20))

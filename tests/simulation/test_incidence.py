@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import math
 
-import naive_caster
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -24,6 +23,7 @@ from doorstate.simulation.sensor import (
     render_behind_glass,
 )
 from doorstate.types import Part
+from tests.simulation import naive_caster
 
 CAMERA = Intrinsics.from_hfov(18, 14, math.radians(70))
 LEVEL = CameraPose(0.0, 0.0, 0.0, 0.0)

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import math
 
-import naive_caster
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -17,6 +16,7 @@ from doorstate.simulation.frames import level
 from doorstate.simulation.scene import Box
 from doorstate.simulation.sensor import CameraPose, render
 from doorstate.types import Part
+from tests.simulation import naive_caster
 
 CAMERA = Intrinsics.from_hfov(18, 14, math.radians(70))
 angles = st.floats(-0.6, 0.6)

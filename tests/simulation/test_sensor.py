@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import math
 
-import naive_caster
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
@@ -17,6 +16,7 @@ from doorstate.io.depth import depth_to_points
 from doorstate.simulation.scene import Box
 from doorstate.simulation.sensor import CAMERAS, CameraPose, DepthCamera, Render, cut_range, render
 from doorstate.types import Part
+from tests.simulation import naive_caster
 
 CAMERA = Intrinsics.from_hfov(18, 14, math.radians(70))
 LEVEL = CameraPose(0.0, 0.0, 0.0, 0.0)

@@ -19,7 +19,7 @@ from doorstate.types import Part
 from doorstate.viewer.cloud_page import look, render_view
 from doorstate.viewer.live_page import LivePage
 from doorstate.viewer.named_clouds import NamedCloud
-from headless_chromium import Browser
+from tests.headless_chromium import Browser
 
 Entry = dict[str, Any]
 

@@ -7,9 +7,9 @@ import pytest
 import torch
 from torch import Tensor
 from torch.nn import functional
-from twins import assert_same, rows
 
 from doorstate.networks.kernels.fused import linear_max, linear_norm_max, linear_relu, with_moments
+from tests.networks.twins import assert_same, rows
 
 
 @pytest.mark.parametrize("count", [20, 64, 192])

@@ -3,11 +3,9 @@
 
 from __future__ import annotations
 
-import plain
 import pytest
 import torch
 from torch import Tensor
-from twins import assert_same, rows
 
 from doorstate.networks.kernels.ops import (
     gather_rows,
@@ -16,6 +14,8 @@ from doorstate.networks.kernels.ops import (
     neighbour_sum,
     weigh_neighbours,
 )
+from tests.networks import plain
+from tests.networks.twins import assert_same, rows
 
 
 def neighbours(batch: int, queries: int, points: int, k: int) -> Tensor:

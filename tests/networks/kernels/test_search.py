@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import plain
 import pytest
 import torch
 from hypothesis import given, settings
@@ -12,6 +11,7 @@ from sklearn.neighbors import NearestNeighbors
 
 from doorstate.networks.kernels.ops import gather_rows
 from doorstate.networks.kernels.search import ball_query, knn, spatial_order
+from tests.networks import plain
 
 # On a line, so that every distance is exact; farthest-point order does not matter here.
 LINE = torch.tensor([[[x, 0.0, 0.0] for x in (0.0, 0.125, 0.375, 0.0625, 0.25)]])
