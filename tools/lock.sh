@@ -4,4 +4,4 @@ set -euo pipefail
 echo "# What 'make setup' installs; written by 'make lock'."
 echo "# optional: $("$1/bin/python" -m pip freeze | grep '^fpsample==')"
 # With --all, for setuptools: tests build the wheel without fetching it.
-"$1/bin/python" -m pip freeze --all --exclude pip --exclude-editable --exclude fpsample | sed 's/^torch==\([0-9.]*\)+.*/torch==\1/'
+"$1/bin/python" -m pip freeze --all --exclude pip --exclude-editable --exclude fpsample --exclude atheris | sed 's/^torch==\([0-9.]*\)+.*/torch==\1/'
