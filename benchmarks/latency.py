@@ -97,7 +97,9 @@ def _predictors(
     for runtime, int8 in (("onnxruntime", False), ("onnxruntime int8", True)):
         path = folder / f"{name}-{points}-{runtime}.onnx"
         if not path.is_file():
-            cloud = preparation.prepare_cloud(raw, points, thin=True).points[None]
+            cloud = preparation.prepare_cloud(
+                raw, preparation.CloudSpec(num_points=points, thin=True)
+            ).points[None]
             labels = np.zeros(1, dtype=np.int64)
             export_onnx(path, network, card, LabelledClouds(cloud, labels), int8=int8)
         predictors[runtime] = predictor.Predictor(OnnxBackend(path, threads), card, points)

@@ -16,6 +16,7 @@ from pathlib import Path
 from doorstate import Predictor, ReadOptions, read_cloud
 from doorstate.cli.console import progress_bar
 from doorstate.cli.training import compare_live
+from doorstate.clouds.preparation import CloudSpec
 from doorstate.dataset.prepare import Preparation, prepare_dataset
 from doorstate.io.readers import UNITS_M, find_clouds
 from doorstate.training.comparison import load_experiment
@@ -39,7 +40,7 @@ def main() -> None:
 
     with progress_bar("Preparing") as progress:
         prepared = prepare_dataset(
-            Preparation(asked.clouds, asked.points, options=options),
+            Preparation(asked.clouds, CloudSpec(num_points=asked.points), options=options),
             asked.out / "prepared",
             progress=progress,
         )

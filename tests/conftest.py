@@ -13,6 +13,7 @@ import torch
 from hypothesis import settings
 
 from doorstate.cli import main
+from doorstate.clouds.preparation import CloudSpec
 from doorstate.dataset.join import join_datasets
 from doorstate.dataset.prepare import Preparation, prepare_dataset
 from doorstate.dataset.store import PreparedDataset
@@ -52,7 +53,9 @@ def simulated_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def small_dataset(simulated_folder: Path, tmp_path_factory: pytest.TempPathFactory) -> PreparedDataset:
     """The same samples with 160 points each."""
     folder = tmp_path_factory.mktemp("prepared") / "small"
-    return prepare_dataset(Preparation(simulated_folder, SMALL_POINTS), folder, workers=1).dataset
+    return prepare_dataset(
+        Preparation(simulated_folder, CloudSpec(num_points=SMALL_POINTS)), folder, workers=1
+    ).dataset
 
 
 @pytest.fixture(scope="session")
@@ -74,7 +77,7 @@ def _scenes(folder: Path, preset: str, seed: int, scenes: int) -> PreparedDatase
     small = SCENE_PRESETS[preset].model_copy(update={"camera": DepthCamera(width=160, height=120)})
     simulate_dataset(folder / preset, SceneSettings(preset=small, seed=seed, scenes=scenes), workers=1)
     return prepare_dataset(
-        Preparation(folder / preset, SMALL_POINTS), folder / f"{preset}-160", workers=1
+        Preparation(folder / preset, CloudSpec(num_points=SMALL_POINTS)), folder / f"{preset}-160", workers=1
     ).dataset
 
 

@@ -8,7 +8,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from doorstate.clouds.preparation import MIN_POINTS, check_one_cloud, is_image, normalize, prepare_cloud
+from doorstate.clouds.preparation import (
+    MIN_POINTS,
+    CloudSpec,
+    check_one_cloud,
+    is_image,
+    normalize,
+    prepare_cloud,
+)
 from doorstate.clouds.sampling import farthest_point_indices
 from doorstate.errors import CloudContentError
 from doorstate.types import Points
@@ -42,7 +49,7 @@ def test_what_was_not_measured_is_dropped_and_indices_point_to_raw_rows(
         if holes
         else raw
     )
-    points, indices = prepare_cloud(raw, 200)
+    points, indices = prepare_cloud(raw, CloudSpec(num_points=200))
     assert points.dtype == np.float32
     np.testing.assert_array_equal(points, raw[indices])
     np.testing.assert_array_equal(points, cloud(400, seed)[farthest_point_indices(cloud(400, seed), 200)])
@@ -51,13 +58,13 @@ def test_what_was_not_measured_is_dropped_and_indices_point_to_raw_rows(
 def test_organized_clouds_are_taken_row_by_row() -> None:
     raw = cloud(600).reshape(20, 30, 3)
     raw[3, 4] = NAN
-    points, indices = prepare_cloud(raw, 300)
+    points, indices = prepare_cloud(raw, CloudSpec(num_points=300))
     np.testing.assert_array_equal(points, raw.reshape(-1, 3)[indices])
     assert 3 * 30 + 4 not in indices
 
 
 def test_a_small_cloud_gives_all_its_points_once() -> None:
-    points, indices = prepare_cloud(cloud(150), 4096)
+    points, indices = prepare_cloud(cloud(150), CloudSpec(num_points=4096))
     assert sorted(indices) == list(range(150))
     assert points.shape == (150, 3)
 
@@ -65,7 +72,7 @@ def test_a_small_cloud_gives_all_its_points_once() -> None:
 def test_repeated_points_are_taken_once() -> None:
     raw = np.tile(cloud(300), (3, 1))
     for count in (299, 300, 500):
-        points, indices = prepare_cloud(raw, count)
+        points, indices = prepare_cloud(raw, CloudSpec(num_points=count))
         assert len(indices) == len(np.unique(points, axis=0)) == min(count, 300)
 
 
@@ -98,16 +105,16 @@ def test_repeated_points_are_taken_once() -> None:
 )
 def test_a_cloud_that_cannot_be_used_is_refused_in_one_line(raw: Points, message: str) -> None:
     with pytest.raises(CloudContentError, match=f"^{message}$"):
-        prepare_cloud(raw, 200)
+        prepare_cloud(raw, CloudSpec(num_points=200))
 
 
 def test_fewer_points_than_the_least_are_kept_where_so_few_are_asked_for() -> None:
-    assert prepare_cloud(cloud(500), 16).points.shape == (16, 3)
+    assert prepare_cloud(cloud(500), CloudSpec(num_points=16)).points.shape == (16, 3)
 
 
 def test_zeros_for_what_did_not_return_are_no_reason_to_doubt_the_units() -> None:
     raw = np.concatenate([np.zeros((2000, 3), np.float32), cloud(500)])
-    assert prepare_cloud(raw, 200).indices.min() >= 2000
+    assert prepare_cloud(raw, CloudSpec(num_points=200)).indices.min() >= 2000
 
 
 @given(seed=st.integers(0, 2**32 - 1), offset=st.floats(-20, 20))
@@ -126,24 +133,28 @@ def test_thinning_names_the_pixels_of_the_whole_cloud() -> None:
     rng = np.random.default_rng(0)
     image = rng.uniform(1, 3, (96, 128, 3)).astype(np.float32)
     image[::3, ::5] = np.nan
-    points, indices = prepare_cloud(image, 140, thin=True)
+    points, indices = prepare_cloud(image, CloudSpec(num_points=140, thin=True))
     np.testing.assert_array_equal(image.reshape(-1, 3)[indices], points)
     rows, columns = np.divmod(indices, 128)
     step = 2  # 48 x 64 = 3072 pixels; every third row and column would leave fewer than 16 x 140
     assert set(rows % step) == set(columns % step) == {0}
-    few = prepare_cloud(image[:16, :16], 140, thin=True)
-    np.testing.assert_array_equal(few.points, prepare_cloud(image[:16, :16], 140).points)
+    few = prepare_cloud(image[:16, :16], CloudSpec(num_points=140, thin=True))
+    np.testing.assert_array_equal(
+        few.points, prepare_cloud(image[:16, :16], CloudSpec(num_points=140)).points
+    )
 
 
 def test_what_lies_too_far_ahead_is_left_out_whole_or_thinned() -> None:
     cloud = np.random.default_rng(4).uniform(0.5, 9, (60, 80, 3)).astype(np.float32)
     for thin in (False, True):
-        prepared = prepare_cloud(cloud, 200, thin=thin, max_depth_m=5.0)
+        prepared = prepare_cloud(cloud, CloudSpec(num_points=200, thin=thin, max_depth_m=5.0))
         assert len(prepared.points) == 200
         assert prepared.points[:, 0].max() <= 5
         assert np.array_equal(cloud.reshape(-1, 3)[prepared.indices], prepared.points)
         near = np.where(cloud[..., :1] <= 5, cloud, np.nan)
-        assert np.array_equal(prepare_cloud(near, 200, thin=thin).points, prepared.points)
+        assert np.array_equal(
+            prepare_cloud(near, CloudSpec(num_points=200, thin=thin)).points, prepared.points
+        )
 
 
 def test_nothing_within_reach_is_told() -> None:
@@ -151,7 +162,7 @@ def test_nothing_within_reach_is_told() -> None:
         np.float32
     )
     with pytest.raises(CloudContentError, match="too few points: 0 within 5 m"):
-        prepare_cloud(cloud, 200, max_depth_m=5.0)
+        prepare_cloud(cloud, CloudSpec(num_points=200, max_depth_m=5.0))
 
 
 def test_an_image_is_told_from_several_clouds() -> None:
@@ -175,7 +186,7 @@ def test_frames_in_the_order_of_their_pixels_are_no_image_either(kept: slice) ->
 
 def farthest_first(points: Points, seed: int) -> Points:
     shuffled = np.random.default_rng(seed).permutation(points)
-    return prepare_cloud(shuffled, 512).points
+    return prepare_cloud(shuffled, CloudSpec(num_points=512)).points
 
 
 def test_what_is_too_far_away_is_said_with_how_far() -> None:
@@ -183,4 +194,4 @@ def test_what_is_too_far_away_is_said_with_how_far() -> None:
     with pytest.raises(
         CloudContentError, match=r"0 within 5 m ahead, .* half of all are more than 2.* m away"
     ):
-        prepare_cloud(far, 200, max_depth_m=5)
+        prepare_cloud(far, CloudSpec(num_points=200, max_depth_m=5))

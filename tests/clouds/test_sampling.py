@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from doorstate.clouds import sampling
-from doorstate.clouds.preparation import prepare_cloud
+from doorstate.clouds.preparation import CloudSpec, prepare_cloud
 from doorstate.clouds.sampling import bucket_farthest_points, farthest_point_indices
 from doorstate.io.camera import Intrinsics
 from doorstate.io.depth import depth_to_points
@@ -89,7 +89,9 @@ def gazebo_cloud(number: int) -> Points:
 
 
 def simulated_cloud(index: int, count: int) -> Points:
-    return prepare_cloud(replay(draw_pose(PRESETS["ogurob"], 0, index)[1]).points, count).points
+    return prepare_cloud(
+        replay(draw_pose(PRESETS["ogurob"], 0, index)[1]).points, CloudSpec(num_points=count)
+    ).points
 
 
 @both_forms

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from doorstate.clouds.preparation import CloudSpec
 from doorstate.dataset.deepdoors2 import CAMERA, deepdoors2_rows, read_deepdoors2
 from doorstate.dataset.layouts import LAYOUTS, find_layout
 from doorstate.dataset.prepare import Preparation, prepare_dataset
@@ -181,7 +182,9 @@ def test_prepare_takes_the_layout(root: Path, tmp_path: Path, run: Run) -> None:
     code, said, err = run(*asked, "--out", out)
     assert (code, err) == (0, "")
     assert "3 clouds of 128 points" in said
-    again = prepare_dataset(Preparation(part, 128, layout="deepdoors2"), out, workers=1).dataset
+    again = prepare_dataset(
+        Preparation(part, CloudSpec(num_points=128), layout="deepdoors2"), out, workers=1
+    ).dataset
     assert [(row["state"], row["split"]) for row in again.rows] == [
         ("closed", "test"),
         ("open", "test"),

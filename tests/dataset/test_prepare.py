@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from doorstate._files import read_csv, write_csv
-from doorstate.clouds.preparation import prepare_cloud
+from doorstate.clouds.preparation import CloudSpec, prepare_cloud
 from doorstate.dataset import prepare
 from doorstate.dataset.prepare import REJECTED, Preparation, prepare_dataset
 from doorstate.dataset.store import CLOUDS, DESCRIPTION, MANIFEST, PARTS, open_dataset
@@ -23,6 +23,7 @@ from doorstate.simulation.manifest import unflatten
 from doorstate.types import STATES, Part
 
 NUM_POINTS = 256
+SPEC = CloudSpec(num_points=NUM_POINTS)
 FILES = (MANIFEST, CLOUDS, PARTS, DESCRIPTION, "preparation.json")
 
 
@@ -34,7 +35,7 @@ def four_samples_a_piece(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture(scope="module")
 def undisturbed(tiny_simulation: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("prepared") / "doors"
-    prepare_dataset(Preparation(tiny_simulation, NUM_POINTS), folder, workers=1)
+    prepare_dataset(Preparation(tiny_simulation, SPEC), folder, workers=1)
     return folder
 
 
@@ -74,9 +75,7 @@ def test_of_replayed_clouds_only_so_many_are_kept(
 
 
 def test_clouds_and_parts_are_those_of_the_replayed_rows(tiny_simulation: Path, tmp_path: Path) -> None:
-    dataset, rejected = prepare_dataset(
-        Preparation(tiny_simulation, NUM_POINTS), tmp_path / "doors", workers=1
-    )
+    dataset, rejected = prepare_dataset(Preparation(tiny_simulation, SPEC), tmp_path / "doors", workers=1)
     assert rejected == []
     assert (len(dataset), dataset.num_points, dataset.clouds.shape) == (15, NUM_POINTS, (15, NUM_POINTS, 3))
     assert (dataset.description.kind, dataset.description.source) == ("simulated", "ogurob")
@@ -84,7 +83,7 @@ def test_clouds_and_parts_are_those_of_the_replayed_rows(tiny_simulation: Path, 
     for index, row in enumerate(dataset.rows):
         sample = unflatten(row)
         frame = replay(sample)
-        points, raw_rows = prepare_cloud(frame.points, NUM_POINTS)
+        points, raw_rows = prepare_cloud(frame.points, SPEC)
         np.testing.assert_array_equal(dataset.cloud(index), points)
         np.testing.assert_array_equal(dataset.parts(index), frame.cut.part.reshape(-1)[raw_rows])
         assert (dataset.parts(index) != Part.NONE).all()
@@ -98,7 +97,7 @@ def test_clouds_and_parts_are_those_of_the_replayed_rows(tiny_simulation: Path, 
 
 @pytest.mark.usefixtures("four_samples_a_piece")
 def test_processes_make_the_same_files(tiny_simulation: Path, undisturbed: Path, tmp_path: Path) -> None:
-    prepare_dataset(Preparation(tiny_simulation, NUM_POINTS), tmp_path / "doors", workers=2)
+    prepare_dataset(Preparation(tiny_simulation, SPEC), tmp_path / "doors", workers=2)
     assert contents(tmp_path / "doors") == contents(undisturbed)
 
 
@@ -114,13 +113,19 @@ def test_goes_on_with_the_pieces_that_are_left(
 
     with pytest.raises(KeyboardInterrupt):
         prepare_dataset(
-            Preparation(tiny_simulation, NUM_POINTS), folder, workers=1, progress=stop_after_three
+            Preparation(tiny_simulation, SPEC),
+            folder,
+            workers=1,
+            progress=stop_after_three,
         )
     assert sorted(path.name for path in folder.iterdir()) == ["pieces", "preparation.json"]
     (folder / "pieces" / "00001.npz").unlink()
     steps: list[tuple[int, int]] = []
     prepare_dataset(
-        Preparation(tiny_simulation, NUM_POINTS), folder, workers=1, progress=lambda *step: steps.append(step)
+        Preparation(tiny_simulation, SPEC),
+        folder,
+        workers=1,
+        progress=lambda *step: steps.append(step),
     )
     assert steps == [(2, 4), (3, 4), (4, 4)]
     assert contents(folder) == contents(undisturbed)
@@ -135,7 +140,7 @@ def test_a_preparation_that_stopped_before_its_end_is_made_whole(
     shutil.copytree(undisturbed, tmp_path / "doors")
     for name in lost:
         (tmp_path / "doors" / name).unlink()
-    prepare_dataset(Preparation(tiny_simulation, NUM_POINTS), tmp_path / "doors", workers=1)
+    prepare_dataset(Preparation(tiny_simulation, SPEC), tmp_path / "doors", workers=1)
     assert contents(tmp_path / "doors") == contents(undisturbed)
 
 
@@ -148,36 +153,43 @@ def test_a_whole_data_set_is_opened_and_left_over_pieces_are_cleared(
     (folder / "pieces" / "00000.npz").touch()
     steps: list[tuple[int, int]] = []
     found = prepare_dataset(
-        Preparation(tiny_simulation, NUM_POINTS), folder, workers=1, progress=lambda *step: steps.append(step)
+        Preparation(tiny_simulation, SPEC),
+        folder,
+        workers=1,
+        progress=lambda *step: steps.append(step),
     )
     assert (len(found.dataset), steps) == (15, [(1, 1)])
     assert contents(folder) == contents(undisturbed)
 
 
 def test_clouds_end_where_they_are_told_to(tiny_simulation: Path, tmp_path: Path) -> None:
-    asked = Preparation(tiny_simulation, NUM_POINTS, max_depth_m=3.0)
+    asked = Preparation(tiny_simulation, CloudSpec(num_points=NUM_POINTS, max_depth_m=3.0))
     near = prepare_dataset(asked, tmp_path / "near", workers=1).dataset
-    far = prepare_dataset(Preparation(tiny_simulation, NUM_POINTS), tmp_path / "far", workers=1).dataset
+    far = prepare_dataset(Preparation(tiny_simulation, SPEC), tmp_path / "far", workers=1).dataset
     assert (near.max_depth_m, far.max_depth_m) == (3.0, 5.0)
     assert near.clouds[..., 0].max() <= 3.0 < far.clouds[..., 0].max()
     with pytest.raises(ConfigError, match="preparation of something else"):
-        prepare_dataset(asked._replace(max_depth_m=2.0), tmp_path / "near", workers=1)
+        prepare_dataset(
+            asked._replace(spec=CloudSpec(num_points=NUM_POINTS, max_depth_m=2.0)),
+            tmp_path / "near",
+            workers=1,
+        )
 
 
 def test_thinned_clouds_are_those_that_a_predictor_samples(tiny_simulation: Path, tmp_path: Path) -> None:
-    asked = Preparation(tiny_simulation, NUM_POINTS, thin=True)
+    asked = Preparation(tiny_simulation, CloudSpec(num_points=NUM_POINTS, thin=True))
     thinned = prepare_dataset(asked, tmp_path / "thin", workers=1).dataset
     assert thinned.description.thin
     for index in (0, 7):
-        expected = prepare_cloud(thinned.raw_cloud(index), NUM_POINTS, thin=True)
-        every = prepare_cloud(thinned.raw_cloud(index), NUM_POINTS)
+        expected = prepare_cloud(thinned.raw_cloud(index), CloudSpec(num_points=NUM_POINTS, thin=True))
+        every = prepare_cloud(thinned.raw_cloud(index), SPEC)
         np.testing.assert_array_equal(thinned.cloud(index), expected.points)
         assert not np.array_equal(expected.points, every.points)
     shutil.copy(tmp_path / "thin" / MANIFEST, tmp_path)
     thinned.description.model_copy(update={"clouds": "replayed"}).save(tmp_path)
     np.testing.assert_array_equal(open_dataset(tmp_path).cloud(7), thinned.cloud(7))
     with pytest.raises(ConfigError, match="preparation of something else"):
-        prepare_dataset(asked._replace(thin=False), tmp_path / "thin", workers=1)
+        prepare_dataset(asked._replace(spec=SPEC), tmp_path / "thin", workers=1)
 
 
 @pytest.mark.parametrize(
@@ -203,7 +215,7 @@ def test_a_manifest_that_was_changed_is_noticed(
             row[column] = value
     write_csv(source / MANIFEST, rows)
     with pytest.raises(DatasetError, match=message) as caught:
-        prepare_dataset(Preparation(source, NUM_POINTS), tmp_path / "doors", workers=1)
+        prepare_dataset(Preparation(source, SPEC), tmp_path / "doors", workers=1)
     assert rows[0 if value is None else 4]["sample_id"] in str(caught.value)
     assert "\n" not in str(caught.value)
 
@@ -212,7 +224,11 @@ def test_an_unfinished_simulation_is_not_prepared(tiny_simulation: Path, tmp_pat
     shutil.copytree(tiny_simulation, tmp_path / "unfinished")
     (tmp_path / "unfinished" / MANIFEST).unlink()
     with pytest.raises(DatasetError, match="the simulation is not complete; run 'doorstate simulate' again"):
-        prepare_dataset(Preparation(tmp_path / "unfinished", NUM_POINTS), tmp_path / "doors", workers=1)
+        prepare_dataset(
+            Preparation(tmp_path / "unfinished", SPEC),
+            tmp_path / "doors",
+            workers=1,
+        )
 
 
 def test_another_preparation_or_other_files_are_not_written_over(
@@ -220,11 +236,13 @@ def test_another_preparation_or_other_files_are_not_written_over(
 ) -> None:
     before = contents(undisturbed)
     with pytest.raises(ConfigError, match="holds a preparation of something else"):
-        prepare_dataset(Preparation(tiny_simulation, NUM_POINTS // 2), undisturbed, workers=1)
+        prepare_dataset(
+            Preparation(tiny_simulation, CloudSpec(num_points=NUM_POINTS // 2)), undisturbed, workers=1
+        )
     (tmp_path / "mine.txt").touch()
     for folder in (tmp_path, tmp_path / "mine.txt"):
         with pytest.raises(ConfigError, match="holds something else"):
-            prepare_dataset(Preparation(tiny_simulation, NUM_POINTS), folder, workers=1)
+            prepare_dataset(Preparation(tiny_simulation, SPEC), folder, workers=1)
     assert contents(undisturbed) == before
 
 
@@ -248,7 +266,7 @@ def test_files_of_class_folders_are_prepared_and_the_rest_listed_with_its_reason
     class_folders: Path, tmp_path: Path
 ) -> None:
     folder = tmp_path / "doors"
-    dataset, rejected = prepare_dataset(Preparation(class_folders, NUM_POINTS), folder, workers=1)
+    dataset, rejected = prepare_dataset(Preparation(class_folders, SPEC), folder, workers=1)
     assert {row["sample_id"]: row["state"] for row in dataset.rows} == {
         "Closed/a": "closed",
         "Closed/b": "closed",
@@ -257,7 +275,7 @@ def test_files_of_class_folders_are_prepared_and_the_rest_listed_with_its_reason
         "semi-open/a": "semi_open",
     }
     for index, row in enumerate(dataset.rows):
-        expected = prepare_cloud(read_cloud(class_folders / row["file"]), NUM_POINTS).points
+        expected = prepare_cloud(read_cloud(class_folders / row["file"]), SPEC).points
         np.testing.assert_array_equal(dataset.cloud(index), expected)
     assert (dataset.description.kind, dataset.description.source) == ("imported", "OGUROB")
     assert dataset.parts(0) is None
@@ -270,13 +288,13 @@ def test_files_of_class_folders_are_prepared_and_the_rest_listed_with_its_reason
         "Open/empty.csv",
         "Open/notes.txt",
     }
-    assert reasons["Closed/small.pcd"] == "too few points: 200 distinct, 256 asked for (--points)"
-    assert reasons["Closed/tiled.pcd"] == "too few points: 200 distinct, 256 asked for (--points)"
+    assert reasons["Closed/small.pcd"].startswith("too few points: 200 distinct, 256 needed")
+    assert reasons["Closed/tiled.pcd"].startswith("too few points: 200 distinct, 256 needed")
     assert reasons["Open/empty.csv"] == "the cloud is empty: it holds no points"
     assert reasons["Open/notes.txt"].startswith("notes.txt: expected rows of numbers")
     assert reasons["Open/broken.pcd"].startswith("broken.pcd: ")
     assert read_csv(folder / REJECTED) == rejected
-    again = prepare_dataset(Preparation(class_folders, NUM_POINTS), folder, workers=1)
+    again = prepare_dataset(Preparation(class_folders, SPEC), folder, workers=1)
     assert again.rejected == rejected
 
 
@@ -284,9 +302,7 @@ def test_poses_bring_strata_and_read_options_are_obeyed(class_folders: Path, tmp
     poses = tmp_path / "poses.csv"
     poses.write_text("file,x_m,y_m,room\nOpen/a.pcd,0.0,2.2,hall\n", encoding="utf-8")
     options = ReadOptions(frame="optical")
-    dataset = prepare_dataset(
-        Preparation(class_folders, NUM_POINTS, poses, options), tmp_path / "doors", 1
-    ).dataset
+    dataset = prepare_dataset(Preparation(class_folders, SPEC, poses, options), tmp_path / "doors", 1).dataset
     index = dataset.index_of("Open/a")
     row = dataset.rows[index]
     assert (row["distance_band"], row["region"], row["room"]) == ("2.0-2.5", "green", "hall")
@@ -297,10 +313,10 @@ def test_poses_bring_strata_and_read_options_are_obeyed(class_folders: Path, tmp
 
 
 def test_changed_files_are_another_preparation(class_folders: Path, tmp_path: Path) -> None:
-    prepare_dataset(Preparation(class_folders, NUM_POINTS), tmp_path / "doors", workers=1)
+    prepare_dataset(Preparation(class_folders, SPEC), tmp_path / "doors", workers=1)
     (class_folders / "Open" / "b.pcd").unlink()
     with pytest.raises(ConfigError, match="holds a preparation of something else"):
-        prepare_dataset(Preparation(class_folders, NUM_POINTS), tmp_path / "doors", workers=1)
+        prepare_dataset(Preparation(class_folders, SPEC), tmp_path / "doors", workers=1)
 
 
 def test_nothing_that_could_be_prepared_is_an_error_with_the_first_reason(
@@ -309,5 +325,5 @@ def test_nothing_that_could_be_prepared_is_an_error_with_the_first_reason(
     with pytest.raises(
         DatasetError, match="none of the 10 clouds could be prepared; the first: too few points: 600"
     ):
-        prepare_dataset(Preparation(class_folders, 4096), tmp_path / "doors", workers=1)
+        prepare_dataset(Preparation(class_folders, CloudSpec(num_points=4096)), tmp_path / "doors", workers=1)
     assert not (tmp_path / "doors").exists(), "the same folder is free for another try"

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from doorstate._jobs import Shard
+from doorstate.clouds.preparation import CloudSpec
 from doorstate.dataset.loader import CloudLoader
 from doorstate.dataset.prepare import Preparation, prepare_dataset, prepare_shard
 from doorstate.dataset.splits import draw_splits
@@ -20,6 +21,7 @@ from doorstate.simulation.settings import SceneSettings
 from doorstate.types import STATES, Part
 
 POINTS = 256
+SPEC = CloudSpec(num_points=POINTS)
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +39,7 @@ def test_scenes_are_prepared_with_their_parts_and_columns(
     simulated: dict[PresetName, Path], tmp_path: Path
 ) -> None:
     dataset = prepare_dataset(
-        Preparation(simulated["cluttered"], POINTS), tmp_path / "doors", workers=1
+        Preparation(simulated["cluttered"], SPEC), tmp_path / "doors", workers=1
     ).dataset
     assert dataset.clouds.shape == (36, POINTS, 3)
     np.testing.assert_array_equal(dataset.labels, list(range(3)) * 12)
@@ -57,7 +59,7 @@ def test_scenes_are_prepared_with_their_parts_and_columns(
 def test_scenes_without_a_door_have_a_label_of_their_own_that_no_network_of_three_states_takes(
     simulated: dict[PresetName, Path], tmp_path: Path
 ) -> None:
-    dataset = prepare_dataset(Preparation(simulated["no-door"], POINTS), tmp_path / "none", workers=1).dataset
+    dataset = prepare_dataset(Preparation(simulated["no-door"], SPEC), tmp_path / "none", workers=1).dataset
     assert dataset.labels.tolist() == [len(STATES)] * 5
     with pytest.raises(ConfigError, match="5 samples show no door, such as no-door-0-00000-no_door"):
         CloudLoader(dataset, [row["sample_id"] for row in dataset.rows], 64)
@@ -67,12 +69,20 @@ def test_preparation_in_shards_joins_to_the_same_bytes(
     simulated: dict[PresetName, Path], tmp_path: Path
 ) -> None:
     source = simulated["cluttered"]
-    prepare_dataset(Preparation(source, POINTS), tmp_path / "whole", workers=1)
+    prepare_dataset(Preparation(source, SPEC), tmp_path / "whole", workers=1)
     for number in (2, 1):
-        prepare_shard(Preparation(source, POINTS), tmp_path / "shared", Shard(number, 2), workers=1)
+        prepare_shard(
+            Preparation(source, SPEC),
+            tmp_path / "shared",
+            Shard(number, 2),
+            workers=1,
+        )
     steps: list[tuple[int, int]] = []
     prepare_dataset(
-        Preparation(source, POINTS), tmp_path / "shared", workers=1, progress=lambda *step: steps.append(step)
+        Preparation(source, SPEC),
+        tmp_path / "shared",
+        workers=1,
+        progress=lambda *step: steps.append(step),
     )
     assert steps == [(2, 2)]
     whole, shared = (
@@ -80,4 +90,6 @@ def test_preparation_in_shards_joins_to_the_same_bytes(
     )
     assert whole == shared
     with pytest.raises(ConfigError, match="something else"):
-        prepare_shard(Preparation(source, 128), tmp_path / "shared", Shard(1, 2), workers=1)
+        prepare_shard(
+            Preparation(source, CloudSpec(num_points=128)), tmp_path / "shared", Shard(1, 2), workers=1
+        )

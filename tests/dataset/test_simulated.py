@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from doorstate._jobs import Shard
+from doorstate.clouds.preparation import CloudSpec
 from doorstate.dataset import simulated
 from doorstate.dataset.prepare import Preparation, prepare_dataset
 from doorstate.dataset.simulated import Sampler, simulate_prepared
@@ -20,6 +21,7 @@ from doorstate.simulation.sensor import DepthCamera
 from doorstate.simulation.settings import SceneSettings
 
 NUM_POINTS = 160
+SPEC = CloudSpec(num_points=NUM_POINTS)
 
 
 def settings_of(name: PresetName, scenes: int) -> SceneSettings:
@@ -28,7 +30,7 @@ def settings_of(name: PresetName, scenes: int) -> SceneSettings:
 
 
 def asked_of(source: Path) -> Preparation:
-    return Preparation(source, NUM_POINTS, max_depth_m=4.0, thin=True)
+    return Preparation(source, CloudSpec(num_points=NUM_POINTS, max_depth_m=4.0, thin=True))
 
 
 def contents(folder: Path) -> dict[str, bytes]:
@@ -86,6 +88,6 @@ def test_clouds_that_were_not_sampled_are_rendered_again(two_passes: Path, tmp_p
     shutil.copytree(two_passes / "varied", tmp_path / "varied")
     simulate_prepared(settings_of("varied", 10), asked_of(tmp_path / "varied"), tmp_path / "out", 1)
     assert contents(tmp_path / "out") == contents(two_passes / "varied-160")
-    asked = asked_of(tmp_path / "varied")._replace(thin=False)
+    asked = asked_of(tmp_path / "varied")._replace(spec=CloudSpec(num_points=NUM_POINTS, max_depth_m=4.0))
     with pytest.raises(ConfigError, match="preparation of something else"):
         simulate_prepared(settings_of("varied", 10), asked, tmp_path / "out", 1)

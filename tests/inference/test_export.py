@@ -10,7 +10,7 @@ import onnx
 import pytest
 import torch
 
-from doorstate.clouds.preparation import normalize, prepare_cloud
+from doorstate.clouds.preparation import CloudSpec, normalize, prepare_cloud
 from doorstate.errors import ExportError
 from doorstate.inference import export as onnx_export
 from doorstate.inference.export import TOLERANCE, export_onnx
@@ -36,7 +36,10 @@ def clouds() -> LabelledClouds:
     rng = np.random.default_rng(0)
     sizes_m = rng.uniform(0.3, 3, (7, 1, 3))
     points = (rng.normal(2, 1, (7, 160, 3)) * sizes_m).astype(np.float32)
-    return LabelledClouds(np.stack([prepare_cloud(cloud, 160).points for cloud in points]), np.arange(7) % 3)
+    return LabelledClouds(
+        np.stack([prepare_cloud(cloud, CloudSpec(num_points=160)).points for cloud in points]),
+        np.arange(7) % 3,
+    )
 
 
 def used_to(name: str, clouds: LabelledClouds) -> PointNetwork:

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import torch
 
-from doorstate.clouds.preparation import normalize, prepare_cloud
+from doorstate.clouds.preparation import CloudSpec, normalize, prepare_cloud
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import CloudContentError, ConfigError, WeightsError
 from doorstate.inference.predictor import Predictor, packaged_networks, packaged_weights
@@ -74,7 +74,7 @@ def test_thinning_takes_the_points_from_some_pixels(small_dataset: PreparedDatas
 def test_fewer_points_than_trained_with_are_used_as_they_are(predictor: Predictor) -> None:
     cloud = np.random.default_rng(0).uniform(1, 3, (140, 3)).astype(np.float32)
     assert predictor(cloud).points == 140
-    assert len(prepare_cloud(cloud, 160).points) == 140
+    assert len(prepare_cloud(cloud, CloudSpec(num_points=160)).points) == 140
 
 
 def test_a_frame_without_data_is_unknown_and_costs_its_batch_nothing(predictor: Predictor) -> None:
@@ -264,7 +264,7 @@ def test_heads_answer_in_metres_beside_the_state(headed: Path, small_dataset: Pr
     cloud = replay(unflatten(small_dataset.rows[5])).points
     answer = predictor(cloud)
     assert isinstance(predictor.network, PointNetwork)
-    prepared = prepare_cloud(cloud, 160, thin=True).points[None]
+    prepared = prepare_cloud(cloud, CloudSpec(num_points=160, thin=True)).points[None]
     with torch.no_grad():
         said = answers(predictor.network, torch.from_numpy(normalize(prepared)))
     columns = in_metres(

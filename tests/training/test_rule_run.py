@@ -11,6 +11,7 @@ import pytest
 from sklearn.metrics import f1_score
 
 from doorstate._files import read_csv
+from doorstate.clouds.preparation import CloudSpec
 from doorstate.dataset.prepare import Preparation, prepare_dataset
 from doorstate.dataset.splits import Role
 from doorstate.dataset.store import PreparedDataset
@@ -24,7 +25,9 @@ from doorstate.types import ABSTAINED, STATES
 @pytest.fixture(scope="module")
 def doors(simulated_folder: Path, tmp_path_factory: pytest.TempPathFactory) -> PreparedDataset:
     folder = tmp_path_factory.mktemp("doors") / "clouds"
-    return prepare_dataset(Preparation(simulated_folder, 128), folder, workers=1).dataset
+    return prepare_dataset(
+        Preparation(simulated_folder, CloudSpec(num_points=128)), folder, workers=1
+    ).dataset
 
 
 def config(rule: str) -> RuleRunConfig:

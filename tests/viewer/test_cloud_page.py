@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from doorstate.clouds.preparation import prepare_cloud
+from doorstate.clouds.preparation import CloudSpec, prepare_cloud
 from doorstate.inference.predictor import Predictor
 from doorstate.inference.rule_predictor import RulePredictor
 from doorstate.types import Part
@@ -29,7 +29,7 @@ def decoded(text: str, kind: str) -> np.ndarray:
 def test_an_entry_holds_the_points_that_were_looked_at(
     viewer: Predictor, sightings: list[NamedCloud], entries: list[Entry]
 ) -> None:
-    prepared = prepare_cloud(sightings[1].cloud, 300, thin=True)
+    prepared = prepare_cloud(sightings[1].cloud, CloudSpec(num_points=300, thin=True))
     shown = entries[1]["cloud"]
     points = decoded(shown["points"], "<i2").reshape(-1, 3) / 1000
     np.testing.assert_allclose(points, prepared.points, atol=0.00051)

@@ -8,7 +8,7 @@ import pytest
 import torch
 from numpy.typing import NDArray
 
-from doorstate.clouds.preparation import normalize, prepare_cloud
+from doorstate.clouds.preparation import CloudSpec, normalize, prepare_cloud
 from doorstate.networks import create_network, list_networks
 from doorstate.networks.base import PointNetwork
 from doorstate.types import Points
@@ -24,7 +24,7 @@ def cloud() -> Points:
     for axis in range(3):
         sheet[axis, :, axis] = 1
     sheet[..., 0] += 2
-    return prepare_cloud(sheet.reshape(-1, 3).astype(np.float32), COUNT).points
+    return prepare_cloud(sheet.reshape(-1, 3).astype(np.float32), CloudSpec(num_points=COUNT)).points
 
 
 def network_of(name: str, **options: object) -> PointNetwork:

@@ -19,6 +19,7 @@ from doorstate.cli.options import (
     Workers,
     read_options,
 )
+from doorstate.clouds.preparation import CloudSpec
 from doorstate.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -101,7 +102,7 @@ def simulate(
         raise ConfigError(f"--keep {unknown[0]}: choose from {', '.join(RAW_KINDS)}")
     kinds: Any = tuple(kind for kind in RAW_KINDS if kind in (keep or []))
     settings = settings_for(preset, seed, poses, scenes, kinds, sensor)
-    asked = Preparation(out, points, max_depth_m=max_depth, thin=thin)
+    asked = Preparation(out, CloudSpec(num_points=points, thin=thin, max_depth_m=max_depth))
     if prepared is None and asked != Preparation(out):
         raise ConfigError("--points, --max-depth-m and --thin are for --prepared FOLDER: give it too")
     if shard is not None:
@@ -183,7 +184,8 @@ def prepare(
     options = read_options(frame, roll, units, depth_scale, intrinsics, (fx, fy, cx, cy), layout)
     if layout is not None and poses is not None:
         raise ConfigError("--poses is for class folders: leave it out with --layout")
-    asked = Preparation(source, points, poses, options, layout, max_depth, thin)
+    spec = CloudSpec(num_points=points, thin=thin, max_depth_m=max_depth)
+    asked = Preparation(source, spec, poses, options, layout)
     if shard is not None:
         share = Shard.parse(shard)
         with progress_bar("Preparing") as progress:

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from doorstate._models import FrozenModel
 from doorstate.clouds.sampling import farthest_point_indices
 from doorstate.errors import CloudContentError, TooFewPointsError
 from doorstate.types import Indices, Points
@@ -27,6 +28,25 @@ _OF_DEPTH = "(integer depth: --depth-scale)"
 _IMAGE_LINES, _IMAGE_PLACES, _FEWEST_PAIRS = 8, 32, 12  # looked at, to see whether it is an image
 
 
+class CloudSpec(FrozenModel):
+    """Preparation of a cloud: how many points, from which pixels, to which depth.
+
+    Attributes:
+        num_points: points to keep.
+        thin: of an organized cloud, sample from every second, third, ... row and column only, as long as 16 times
+            `num_points` pixels remain. Several times faster, and no point moves by more than a few pixels.
+        max_depth_m: drop points farther ahead, along x. Farthest-point sampling spreads over space, so that surfaces
+            beyond the training data, such as the end of a corridor, would take most of the points.
+    """
+
+    num_points: int = NUM_POINTS
+    thin: bool = False
+    max_depth_m: float | None = None
+
+
+DEFAULT_SPEC = CloudSpec()
+
+
 class PreparedCloud(NamedTuple):
     """Points in farthest-point order and the rows of the raw cloud they came from."""
 
@@ -34,30 +54,25 @@ class PreparedCloud(NamedTuple):
     indices: Indices  # (n,)
 
 
-def prepare_cloud(
-    points: Points, count: int = NUM_POINTS, *, thin: bool = False, max_depth_m: float | None = None
-) -> PreparedCloud:
-    """Drop unmeasured points, check what is left, and keep `count` points in farthest-point order.
+def prepare_cloud(points: Points, spec: CloudSpec = DEFAULT_SPEC) -> PreparedCloud:
+    """Drop unmeasured points, check the rest, and keep `spec.num_points` of them in farthest-point order.
 
-    A cloud with fewer than `count` distinct points gives all of them, each once; points are never repeated.
+    A cloud with fewer distinct points gives all of them, each once; points are never repeated.
 
     Args:
         points: (N, 3) or organized (H, W, 3) metres; NaN, infinite, (0, 0, 0) or beyond all measure where nothing
             was measured.
-        count: how many points to keep.
-        thin: of an organized cloud look at every second, third, ... row and column only, as long as 16 times `count`
-            pixels remain: several times quicker, and no point moves by more than a few pixels.
-        max_depth_m: leave out what lies farther ahead, along x: farthest-point sampling spreads over space, and what a
-            network has never seen, such as the end of a corridor, would take most of its points.
+        spec: number of points, thinning and depth limit.
 
     Raises:
         CloudContentError: of another form, or units that cannot be metres.
         TooFewPointsError: empty, nothing measured, or fewer than 128 distinct points.
     """
     points = check_form(points)
-    if thin:
+    count, max_depth_m = spec.num_points, spec.max_depth_m
+    if spec.thin:
         pixels = _thinned_pixels(points.shape, count)
-        prepared = prepare_cloud(points.reshape(-1, 3)[pixels], count, max_depth_m=max_depth_m)
+        prepared = prepare_cloud(points.reshape(-1, 3)[pixels], spec.model_copy(update={"thin": False}))
         return PreparedCloud(prepared.points, pixels[prepared.indices])
     flat = np.asarray(points, dtype=np.float32).reshape(-1, 3)
     if len(flat) == 0:

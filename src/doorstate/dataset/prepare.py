@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from doorstate import __version__
 from doorstate._files import atomic_path, is_vacant, read_csv, write_csv, write_text
 from doorstate._jobs import Progress, Shard, default_workers, no_progress, piece_paths, run_pieces
-from doorstate.clouds.preparation import NUM_POINTS
+from doorstate.clouds.preparation import CloudSpec
 from doorstate.dataset.class_folders import labelled_rows
 from doorstate.dataset.layouts import find_layout
 from doorstate.dataset.sampled import exactly, sample_frame
@@ -55,12 +55,10 @@ class Preparation(NamedTuple):
     """What is prepared, and how."""
 
     source: Path  # a simulated folder, class folders of clouds, or a `layout`
-    num_points: int = NUM_POINTS  # of every cloud
+    spec: CloudSpec = CloudSpec()  # of every cloud
     poses_csv: Path | None = None  # distances and angles of class folders (`dataset.class_folders`)
     options: ReadOptions = ReadOptions()  # what the files do not say of themselves
     layout: str | None = None  # of another's folders (`dataset.layouts`)
-    max_depth_m: float | None = None  # leave out what lies farther ahead, as of `clouds.preparation`
-    thin: bool = False  # look at some rows and columns of images only, likewise
 
     @property
     def simulated(self) -> bool:
@@ -88,12 +86,12 @@ class Preparation(NamedTuple):
         """What a folder is claimed with; folders begun by older versions hold the same."""
         settings = {
             "source": str(self.source.resolve()),
-            "num_points": self.num_points,
+            "num_points": self.spec.num_points,
             "options": repr(self.options),
             "rows": hashlib.sha256(json.dumps(rows).encode()).hexdigest(),
             **({} if self.layout is None else {"layout": self.layout}),
-            **({} if self.max_depth_m is None else {"max_depth_m": self.max_depth_m}),
-            **({"thin": True} if self.thin else {}),
+            **({} if self.spec.max_depth_m is None else {"max_depth_m": self.spec.max_depth_m}),
+            **({"thin": True} if self.spec.thin else {}),
         }
         return json.dumps(settings, indent=2) + "\n"
 
@@ -148,9 +146,7 @@ def finish(
     DatasetDescription(
         kind="simulated" if asked.simulated else "imported",
         source=name,
-        num_points=asked.num_points,
-        max_depth_m=asked.max_depth_m,
-        thin=asked.thin,
+        **asked.spec.model_dump(),
         samples=len(rows) - len(rejected),
         doorstate_version=__version__,
     ).save(folder)
@@ -234,12 +230,12 @@ def _prepare_piece(piece: _Piece, path: Path) -> None:
                 parts.append(part)
             else:
                 raw = read(asked.source / row["file"], asked.options)
-                cloud = exactly(raw, asked.num_points, asked.max_depth_m, asked.thin)[0]
+                cloud = exactly(raw, asked.spec).points
             clouds.append(cloud)
             reasons.append("")
         except (CloudError, CameraError) as error:
             reasons.append(str(error))
-    write_clouds(path, asked.num_points, clouds, parts, reasons)
+    write_clouds(path, asked.spec.num_points, clouds, parts, reasons)
 
 
 def write_clouds(
@@ -266,7 +262,7 @@ def _from_simulation(row: dict[str, str], asked: Preparation) -> tuple[Points, N
         raise DatasetError(
             f"{sample.sample_id}: renders differently than its manifest says; simulate it again here"
         )
-    return sample_frame(frame, asked.num_points, asked.max_depth_m, asked.thin)
+    return sample_frame(frame, asked.spec)
 
 
 def _release(folder: Path) -> None:
@@ -297,9 +293,9 @@ def _assemble(
     ]
     if rejected:
         write_csv(folder / REJECTED, rejected)
-    _concatenate(folder / CLOUDS, paths, "clouds", (len(kept), asked.num_points, 3), np.float32)
+    _concatenate(folder / CLOUDS, paths, "clouds", (len(kept), asked.spec.num_points, 3), np.float32)
     if asked.simulated:
-        _concatenate(folder / PARTS, paths, "parts", (len(kept), asked.num_points), np.uint8)
+        _concatenate(folder / PARTS, paths, "parts", (len(kept), asked.spec.num_points), np.uint8)
     write_csv(folder / MANIFEST, kept)
     return rejected
 

@@ -6,37 +6,32 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from doorstate.clouds.preparation import prepare_cloud
+from doorstate.clouds.preparation import CloudSpec, PreparedCloud, prepare_cloud
 from doorstate.errors import CloudContentError
 from doorstate.simulation.frames import Frame
 from doorstate.types import Points
 
 
-def exactly(
-    points: Points, num_points: int, max_depth_m: float | None = None, thin: bool = False
-) -> tuple[Points, NDArray[np.int64]]:
-    """`num_points` distinct points in farthest-point order, none deeper than that, and their rows.
-
-    Depth and thinning are those of `clouds.preparation.prepare_cloud`.
+def exactly(points: Points, spec: CloudSpec) -> PreparedCloud:
+    """Prepare a cloud that must give all `spec.num_points` points.
 
     Raises:
-        CloudContentError: there are fewer.
+        CloudContentError: there are fewer distinct points.
     """
-    prepared = prepare_cloud(points, num_points, thin=thin, max_depth_m=max_depth_m)
-    if len(prepared.points) < num_points:
+    prepared = prepare_cloud(points, spec)
+    if len(prepared.points) < spec.num_points:
+        found = len(prepared.points)
         raise CloudContentError(
-            f"too few points: {len(prepared.points)} distinct, {num_points} asked for (--points)"
+            f"too few points: {found} distinct, {spec.num_points} needed", suggestions={"points": found}
         )
     return prepared
 
 
-def sample_frame(
-    frame: Frame, num_points: int, max_depth_m: float | None = None, thin: bool = False
-) -> tuple[Points, NDArray[np.uint8]]:
-    """(n, 3) metres in farthest-point order, and the part of each (doorstate.types.Part).
+def sample_frame(frame: Frame, spec: CloudSpec) -> tuple[Points, NDArray[np.uint8]]:
+    """Return points (n, 3) in metres in farthest-point order, and the part of each (doorstate.types.Part).
 
     Raises:
         CloudContentError: the frame shows fewer distinct points.
     """
-    cloud, indices = exactly(frame.points, num_points, max_depth_m, thin)
+    cloud, indices = exactly(frame.points, spec)
     return cloud, frame.cut.part.reshape(-1)[indices]

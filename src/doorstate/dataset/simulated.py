@@ -39,8 +39,8 @@ class Sampler:
     @property
     def scratch(self) -> Path:
         """Where the clouds of the pieces wait for the others."""
-        asked = self.asked
-        return asked.source / f"sampled-{asked.num_points}-{asked.max_depth_m}-{asked.thin}"
+        spec = self.asked.spec
+        return self.asked.source / f"sampled-{spec.num_points}-{spec.max_depth_m}-{spec.thin}"
 
     def path(self, piece: str) -> Path:
         """Of the clouds of a piece."""
@@ -48,20 +48,19 @@ class Sampler:
 
     def __call__(self, piece: str, rows: Sequence[Row], frames: Sequence[Frame]) -> None:
         """Sample the frames of a piece, and write their clouds."""
-        asked = self.asked
         clouds: list[Points] = []
         parts: list[NDArray[np.uint8]] = []
         reasons: list[str] = []
         for frame in frames:
             try:
-                cloud, part = sample_frame(frame, asked.num_points, asked.max_depth_m, asked.thin)
+                cloud, part = sample_frame(frame, self.asked.spec)
             except CloudError as error:
                 reasons.append(str(error))
                 continue
             clouds.append(cloud)
             parts.append(part)
             reasons.append("")
-        write_clouds(self.path(piece), asked.num_points, clouds, parts, reasons)
+        write_clouds(self.path(piece), self.asked.spec.num_points, clouds, parts, reasons)
 
 
 def simulate_prepared(

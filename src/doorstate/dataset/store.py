@@ -16,6 +16,7 @@ from pydantic import ValidationError
 
 from doorstate._files import read_csv, write_text
 from doorstate._models import FrozenModel
+from doorstate.clouds.preparation import CloudSpec
 from doorstate.dataset.sampled import sample_frame
 from doorstate.errors import ConfigError, DatasetError, first_validation_error
 from doorstate.simulation.frames import Frame, replay
@@ -40,6 +41,11 @@ class DatasetDescription(FrozenModel):
     clouds: Literal["stored", "replayed"] = "stored"  # replayed: from the rows of a simulated data set
     max_depth_m: float | None = None  # what lay farther ahead was left out
     thin: bool = False  # chosen from some rows and columns of each image, as a predictor does
+
+    @property
+    def spec(self) -> CloudSpec:
+        """Preparation of its clouds."""
+        return CloudSpec(num_points=self.num_points, thin=self.thin, max_depth_m=self.max_depth_m)
 
     def save(self, folder: Path) -> None:
         """Write it; the folder counts as complete from here on."""
@@ -149,12 +155,13 @@ class PreparedDataset:
         return np.array(self._parts[indices, :num_points])
 
     def _make(self, index: int, num_points: int | None) -> tuple[Points, NDArray[np.uint8]]:
-        count = num_points or self.num_points
+        spec = self.description.spec
+        count = num_points or spec.num_points
         if index not in self._made or len(self._made[index][0]) < count:
             _keep(
                 self._made,
                 index,
-                sample_frame(self._frame(index), count, self.description.max_depth_m, self.description.thin),
+                sample_frame(self._frame(index), spec.model_copy(update={"num_points": count})),
                 _KEPT_CLOUDS,
             )
         points, parts = self._made[index]

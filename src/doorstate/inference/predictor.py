@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from doorstate.clouds.preparation import (
     MIN_POINTS,
     NUM_POINTS,
+    CloudSpec,
     PreparedCloud,
     check_one_cloud,
     is_image,
@@ -121,7 +122,7 @@ class Predictor:
         self.network = network
         self.card = card
         self.points = points
-        self.thin = thin
+        self.spec = CloudSpec(num_points=points, thin=thin, max_depth_m=card.max_depth_m)
         self.gate = gate
         self.clock = clock
 
@@ -231,7 +232,7 @@ class Predictor:
             CloudContentError: as for a call.
             TooFewPointsError: there are not enough.
         """
-        prepared = prepare_cloud(points, self.points, thin=self.thin, max_depth_m=self.card.max_depth_m)
+        prepared = prepare_cloud(points, self.spec)
         if isinstance(self.network, OnnxBackend) and len(prepared.points) < self.points:
             raise TooFewPointsError(
                 f"too few points: {len(prepared.points)} distinct, but the .onnx file takes {self.points}: "
@@ -278,7 +279,7 @@ class Predictor:
     def warm_up(self) -> None:
         """Run once on noise, so that the first real cloud is as quick as the others."""
         cloud = np.random.default_rng(0).normal(2.0, 1.0, (self.points, 3)).astype(np.float32)
-        self._ask(prepare_cloud(cloud, self.points).points[None])
+        self._ask(prepare_cloud(cloud, CloudSpec(num_points=self.points)).points[None])
 
 
 class _Said(NamedTuple):

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from doorstate._jobs import Progress, no_progress
-from doorstate.clouds.preparation import prepare_cloud
+from doorstate.clouds.preparation import CloudSpec, prepare_cloud
 from doorstate.errors import ConfigError
 from doorstate.simulation.frames import replay
 from doorstate.simulation.generate import PRESETS, SampleRow, draw_pose, pose_indices
@@ -38,11 +38,14 @@ def reference_clouds(count: int, num_points: int, progress: Progress = no_progre
         ConfigError: more points than a simulated cloud has.
     """
     rows, clouds = reference_rows(count), []
+    spec = CloudSpec(num_points=num_points, thin=True)
     for row in rows:
-        clouds.append(prepare_cloud(replay(row).points, num_points, thin=True).points)
+        clouds.append(prepare_cloud(replay(row).points, spec).points)
         progress(len(clouds), count)
     fewest = min(map(len, clouds))
     if fewest < num_points:
-        raise ConfigError(f"--points {num_points}: a simulated cloud has only {fewest} distinct points")
+        raise ConfigError(
+            f"a simulated cloud has only {fewest} distinct points, not {num_points}", field="points"
+        )
     labels = np.array([STATES.index(row.state) for row in rows], dtype=np.int64)
     return LabelledClouds(np.stack(clouds), labels)

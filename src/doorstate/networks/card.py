@@ -7,7 +7,7 @@ from pydantic import Field
 
 from doorstate import __version__
 from doorstate._models import FrozenModel
-from doorstate.clouds.preparation import SCALE_M
+from doorstate.clouds.preparation import SCALE_M, CloudSpec
 from doorstate.types import STATES
 
 
@@ -31,3 +31,8 @@ class WeightsCard(FrozenModel):
     def points(self) -> int:
         """How many points to look at unless told otherwise."""
         return self.default_points or self.num_points
+
+    @property
+    def spec(self) -> CloudSpec:
+        """Preparation of the clouds that these weights take by default."""
+        return CloudSpec(num_points=self.points, max_depth_m=self.max_depth_m)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from doorstate.clouds.preparation import NUM_POINTS, prepare_cloud
+from doorstate.clouds.preparation import NUM_POINTS, CloudSpec, prepare_cloud
 from doorstate.errors import DoorstateError
 from doorstate.evaluation.detections import encode_detections
 from doorstate.evaluation.pages import encode_bytes, encode_cloud, render_page
@@ -42,7 +42,7 @@ def look(predictor: Predictor | RulePredictor, sighting: NamedCloud) -> Entry:
         if isinstance(predictor, Predictor):
             prepared = predictor.prepare(sighting.cloud)
         else:
-            prepared = prepare_cloud(sighting.cloud, NUM_POINTS, thin=True)
+            prepared = prepare_cloud(sighting.cloud, CloudSpec(thin=True))
     except DoorstateError as error:
         return entry | {"error": str(error)}
     channels = None if answer.state is None else _channels(predictor, prepared.points)
