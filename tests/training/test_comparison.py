@@ -103,7 +103,7 @@ def test_a_missing_experiment_is_named(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "path", sorted(Path(__file__).parents[2].glob("experiments/*.toml")), ids=lambda p: p.name
+    "path", sorted(Path(__file__).parents[2].glob("paper/experiments/*.toml")), ids=lambda p: p.name
 )
 def test_the_experiments_of_the_repository_are_valid(path: Path) -> None:
     asked = tomllib.loads(path.read_text())

@@ -23,8 +23,8 @@ def resolution(
 
     \b
     Examples:
-      doorstate resolution experiments/resolution.toml
-      doorstate resolution experiments/resolution.toml --jobs 2 --out runs/points
+      doorstate resolution paper/experiments/resolution.toml
+      doorstate resolution paper/experiments/resolution.toml --jobs 2 --out runs/points
     """
     from doorstate._files import write_csv
     from doorstate._memory import keep_freed_memory

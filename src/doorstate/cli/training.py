@@ -104,7 +104,7 @@ def compare(
 
     \b
     Examples:
-      doorstate compare experiments/one-fold.toml
+      doorstate compare paper/experiments/one-fold.toml
       doorstate compare --data data/ogurob-4096 --protocol by-pose --networks pointnet,dgcnn --out runs/two
     """
     from doorstate.cli.console import out as stdout

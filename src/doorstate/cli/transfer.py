@@ -21,8 +21,8 @@ def transfer(
 
     \b
     Examples:
-      doorstate transfer experiments/transfer.toml
-      doorstate transfer experiments/transfer.toml --jobs 2 --out runs/elsewhere
+      doorstate transfer paper/experiments/transfer.toml
+      doorstate transfer paper/experiments/transfer.toml --jobs 2 --out runs/elsewhere
     """
     from doorstate.cli.console import out as stdout
     from doorstate.cli.console import print_table

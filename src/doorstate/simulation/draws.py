@@ -16,7 +16,7 @@ class Draws:
     """One stream of draws; lengths are whole tenths of a millimetre, so that rows stay short and exact."""
 
     def __init__(self, seed: int, index: int, what: str) -> None:
-        # Spawn keys, unlike longer seeds, are never one another's beginning padded with zeros (docs/log.md).
+        # Spawn keys, unlike longer seeds, are never one another's beginning padded with zeros (paper/log.md).
         key = (index, zlib.crc32(what.encode()))
         self._rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=key))
 

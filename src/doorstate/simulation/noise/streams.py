@@ -16,5 +16,5 @@ def sample_seed(seed: int, sample_id: str) -> int:
 
 def stage_rng(seed: int, stage: str) -> np.random.Generator:
     """The stream of one stage of one sample."""
-    # Spawn keys, unlike longer seeds, are never one another's beginning padded with zeros (docs/log.md).
+    # Spawn keys, unlike longer seeds, are never one another's beginning padded with zeros (paper/log.md).
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(zlib.crc32(stage.encode()),)))

@@ -16,18 +16,14 @@ from doorstate.dataset.store import PreparedDataset
 from doorstate.evaluation.report import write_report
 from doorstate.evaluation.transfer import load_transfer_results, write_transfer
 from doorstate.training.run_folder import RunFolder
-
-from .test_head_tables import comparison
-
-TOOLS = Path(__file__).parents[2] / "tools"
+from tests.evaluation.test_head_tables import comparison
 
 
 @pytest.fixture
 def worlds(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
-    monkeypatch.syspath_prepend(str(TOOLS))
-    import worlds_page
+    from paper.pages import generalization
 
-    return worlds_page
+    return generalization
 
 
 @pytest.fixture

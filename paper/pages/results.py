@@ -12,10 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from duels import NEARBY_M, cases_table, duels_table, near_the_border, never_seen_table
-from extrapolation import places_cases
-from published import rows_of
-from templates import template
 
 from doorstate._files import write_text
 from doorstate.clouds.preparation import NUM_POINTS
@@ -30,11 +26,16 @@ from doorstate.training.recipes import AUTHORS
 from doorstate.training.run_folder import read_json, run_of
 from doorstate.types import STATES
 
+from ..publish import rows_of
+from .pairwise import NEARBY_M, cases_table, duels_table, near_the_border, never_seen_table
+from .places import places_cases
+from .templates import template
+
 # What the page is about, or costs beside it.
 SHOWN = ("paper", "by-pose", "by-pose-mirrored", "authors", "related")
 ASKED = 0.995  # macro-F1 that every network should reach
 ASKED_NEVER_SEEN = 0.99  # that the best should reach on poses never seen
-BENCHMARK = Path(__file__).resolve().parents[1] / "docs" / "benchmarks" / "networks.json"
+BENCHMARK = Path(__file__).resolve().parents[2] / "docs" / "benchmarks" / "networks.json"
 NAMES = {
     "pointnet": "PointNet",
     "pointnet2": "PointNet++",

@@ -11,10 +11,8 @@ import pytest
 
 from doorstate.dataset.store import PreparedDataset
 from doorstate.evaluation.results import load_results
+from tests.evaluation.conftest import MakeComparison
 
-from .conftest import MakeComparison
-
-TOOLS = Path(__file__).parents[2] / "tools"
 NETWORKS = ("pointnet", "pointnet2", "dgcnn", "pointcnn", "point2sequence")
 TABLES = (
     "table1_samples summary table2_confusion table3_scores table4_closed table5_semi_open table6_open "
@@ -24,10 +22,9 @@ TABLES = (
 
 @pytest.fixture
 def pages(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
-    monkeypatch.syspath_prepend(str(TOOLS))
-    import results_page
+    from paper.pages import results
 
-    return results_page
+    return results
 
 
 @pytest.fixture
@@ -124,7 +121,7 @@ def test_errors_are_told_by_what_they_have_in_common(
 def test_a_place_is_beyond_what_was_learned_or_between(
     pages: ModuleType, make_comparison: MakeComparison, simulated: PreparedDataset
 ) -> None:
-    import extrapolation
+    from paper.pages import places as extrapolation
 
     results = load_results(make_comparison(simulated, protocol="by-pose"))
     at = {"close left": (20, 1.6), "left": (40, 1.6), "far right": (150, 3.0), "middle": (90, 2.0)}

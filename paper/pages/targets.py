@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What was asked of the mixture's weights, and what each network reaches: the first table of docs/worlds.md."""
+"""What was asked of the mixture's weights, and what each network reaches: the first table of docs/generalization.md."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from results_page import NAMES
 
 from doorstate.dataset.store import PreparedDataset
 from doorstate.evaluation.calibration import calibrate, reliability
@@ -20,6 +19,8 @@ from doorstate.evaluation.stratum_tables import is_undecidable
 from doorstate.evaluation.stratum_tables import rows_of as manifest_of
 from doorstate.evaluation.table import Table, number
 from doorstate.types import NO_DOOR
+
+from .results import NAMES
 
 MIXTURE = "mixture-wide"  # the comparison of the page
 AT_4096 = "mixture-points/as-trained-4096"

@@ -3,9 +3,7 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
-import sys
 import tomllib
 from contextlib import nullcontext
 from pathlib import Path
@@ -14,25 +12,18 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from doorstate.dataset.splits import Role, read_splits, write_splits
+from doorstate.dataset.splits import Role, write_splits
 from doorstate.dataset.store import PreparedDataset, open_dataset
 from doorstate.simulation.settings import settings_for
 from doorstate.training.comparison import compare, load_experiment
 from doorstate.training.run_folder import RunFolder
+from paper import reproduce as module
 
-REPOSITORY = Path(__file__).parents[1]
-TOOLS = REPOSITORY / "tools"
+REPOSITORY = Path(__file__).parents[2]
 
 
 @pytest.fixture
-def reproduce(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
-    monkeypatch.syspath_prepend(str(TOOLS))
-    spec = importlib.util.spec_from_file_location("reproduce", TOOLS / "reproduce.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    monkeypatch.setitem(sys.modules, "reproduce", module)
-    spec.loader.exec_module(module)
+def reproduce() -> ModuleType:
     return module
 
 
@@ -93,7 +84,7 @@ def test_what_is_published_is_restored_with_the_weights_of_the_package(
 
 
 def test_folds_that_all_methods_have_finished_are_shown(reproduce: ModuleType, tmp_path: Path) -> None:
-    from results_page import unfinished_runs, whole_folds
+    from paper.pages.results import unfinished_runs, whole_folds
 
     (tmp_path / "comparison.json").write_text('{"networks": ["dgcnn"], "rules": ["angle_bins"], "folds": 3}')
     shown = []
@@ -111,14 +102,13 @@ def test_folds_that_all_methods_have_finished_are_shown(reproduce: ModuleType, t
     assert unfinished_runs(tmp_path) == []
 
 
-# The demo makes clouds of its own: `make demo`.
 @pytest.mark.parametrize(
-    "path", sorted(REPOSITORY.glob("experiments/[!d]*.toml")), ids=lambda path: path.stem
+    "path", sorted(REPOSITORY.glob("paper/experiments/*.toml")), ids=lambda path: path.stem
 )
 def test_an_experiment_comes_after_its_data_and_what_it_begins_with(
     path: Path, reproduce: ModuleType, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    import data_sets
+    from paper import datasets as data_sets
 
     called: list[str] = []
     monkeypatch.setattr(reproduce, "RUNS", tmp_path)
@@ -137,7 +127,9 @@ def test_an_experiment_comes_after_its_data_and_what_it_begins_with(
     (own,) = (number for number, line in enumerate(called) if f"/{path.name}" in line)
     for before in asked.get("trained", {}).values() or filter(None, [asked.get("start_from")]):
         (number,) = (
-            n for n, line in enumerate(called) if f"compare experiments/{Path(before).name}.toml" in line
+            n
+            for n, line in enumerate(called)
+            if f"compare paper/experiments/{Path(before).name}.toml" in line
         )
         assert number < own
 
@@ -153,8 +145,8 @@ def test_a_data_set_of_which_some_clouds_were_left_out_is_gone_on_with(
     monkeypatch: pytest.MonkeyPatch,
     tmp_path: Path,
 ) -> None:
-    import data_sets
-    import doorstate_command
+    from paper import commands as doorstate_command
+    from paper import datasets as data_sets
 
     program = tmp_path / "doorstate"
     program.write_text(
@@ -191,7 +183,7 @@ def test_what_an_experiment_begins_with_is_not_run_again_once_it_is_there(
 
 
 def test_data_sets_are_made_of_what_the_command_line_knows(reproduce: ModuleType, tmp_path: Path) -> None:
-    import data_sets
+    from paper import datasets as data_sets
 
     seeds: dict[str, set[str]] = {}
     for name in data_sets.SIMULATED:
@@ -255,33 +247,3 @@ def test_a_published_run_is_trained_again(
         assert (reproduce.again("pointnet", 3, "trial") is None) is inside
     published.metrics.unlink()
     assert "not all folds of pointnet are published" in reproduce.again("pointnet", 3, "trial")
-
-
-def test_a_fold_inside_a_fold_uses_nothing_that_the_outer_one_tests(
-    reproduce: ModuleType, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    import nested_splits
-
-    outer: dict[str, Role] = {
-        "a": "test",
-        "b": "unused",
-        "c": "train",
-        "d": "val",
-        "e": "train",
-        "f": "train",
-    }
-    inner: dict[str, Role] = {
-        "a": "train",
-        "b": "train",
-        "c": "test",
-        "d": "train",
-        "e": "val",
-        "f": "unused",
-    }
-    write_splits(tmp_path / "splits.csv", [outer, inner])
-    target = tmp_path / "choice" / "splits.csv"
-    command = ["nested_splits", str(tmp_path / "splits.csv"), "--inner", "1", "--out", str(target)]
-    monkeypatch.setattr(sys, "argv", command)
-    nested_splits.main()
-    (roles,) = read_splits(target)
-    assert list(roles.values()) == ["unused", "unused", "test", "train", "val", "unused"]

@@ -19,22 +19,20 @@ from doorstate.training.calibration import at_temperature
 from doorstate.training.comparison import Experiment, compare, prepare_comparison
 from doorstate.types import NO_DOOR
 
-TOOLS = Path(__file__).parents[1] / "tools"
 RECIPE = {"epochs": 1, "batch_size": 8, "precision": "fp32", "coarse_to_fine": []}
 
 
 @pytest.fixture
 def tool(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
-    monkeypatch.syspath_prepend(str(TOOLS))
-    import package_weights
+    from paper import weights
 
-    return package_weights
+    return weights
 
 
 def publish(source: Path, target: Path) -> None:
-    import published  # beside the tool
+    from paper import publish as module
 
-    published.publish(source, target)
+    module.publish(source, target)
 
 
 @pytest.fixture
@@ -155,5 +153,5 @@ def test_weights_that_were_tested_say_how_well_and_when_they_are_unsure(
     publish(runs / "longer", results / "longer")
     tool.main(str(runs / "longer"), "longer-")
     text = (package / "longer-pointnet.md").read_text(encoding="utf-8")
-    assert "goes on from the weights of experiments/mixture.toml" in text
+    assert "goes on from the weights of paper/experiments/mixture.toml" in text
     assert "the loss of the state counted 2 times" in text

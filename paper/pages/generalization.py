@@ -1,15 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""docs/worlds.md, what the mixture's weights reach and how far they carry: words are in the .j2, figures computed."""
+"""docs/generalization.md: figures of the mixture's weights and of the transfer studies."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-
-from duels import FEW_PIXELS, NEARBY_M, cases_table
-from published import rows_of
-from results_page import NAMES, render, whole_folds
-from worlds_targets import AT_4096, CLUTTER, MIXTURE, Published, targets_table
 
 from doorstate.dataset.store import open_dataset
 from doorstate.evaluation.factors import ANGLE, OCCLUSION, factor_bins
@@ -17,6 +12,11 @@ from doorstate.evaluation.results import load_results
 from doorstate.evaluation.table import Table, number
 from doorstate.networks import list_networks
 from doorstate.training.run_folder import read_json
+
+from ..publish import rows_of
+from .pairwise import FEW_PIXELS, NEARBY_M, cases_table
+from .results import NAMES, render, whole_folds
+from .targets import AT_4096, CLUTTER, MIXTURE, Published, targets_table
 
 FEW_MEASURED = 150_000  # of the 307,200 pixels of an image
 # Where there is little to fit a plane to, or the planes are not those of leaf and wall.
@@ -65,7 +65,7 @@ def write_worlds_page(results_folder: Path, reports_folder: Path, page: Path) ->
     rows = {row["sample_id"]: row for row in dataset.rows}
     cases = cases_table(results, rows, results.networks, CASES)
     render(
-        "worlds.md.j2",
+        "generalization.md.j2",
         page,
         results=results,
         targets=targets_table(published, networks).to_markdown().strip(),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the files of experiments/ ask for, and what is published of those that ask weights of other experiments."""
+"""Files of paper/experiments/, and published results of the studies among them."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from doorstate.evaluation.transfer import (
 
 
 class Asked(NamedTuple):
-    """A file of experiments/, by what it says."""
+    """A file of paper/experiments/, by what it says."""
 
     name: str
     content: dict[str, Any]
@@ -49,7 +49,7 @@ class Asked(NamedTuple):
 
 
 def read_asked(path: Path) -> Asked:
-    """Read a file of experiments/."""
+    """Read a file of paper/experiments/."""
     return Asked(path.stem, tomllib.loads(path.read_text(encoding="utf-8")))
 
 

@@ -10,18 +10,14 @@ import pytest
 
 from doorstate.dataset.store import PreparedDataset
 from doorstate.evaluation.results import load_results
-
-from .conftest import MakeComparison
-
-TOOLS = Path(__file__).parents[2] / "tools"
+from tests.evaluation.conftest import MakeComparison
 
 
 @pytest.fixture
 def duels(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
-    monkeypatch.syspath_prepend(str(TOOLS))
-    import duels
+    from paper.pages import pairwise
 
-    return duels
+    return pairwise
 
 
 def samples_of(dataset: PreparedDataset, state: str) -> list[str]:

@@ -21,11 +21,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from published import rows_of
-from results_page import NAMES
-from studies import Asked, read_asked, resolution_results, study_table
-from templates import template
-from zoo_page import PAGE, page
 
 from doorstate._files import write_text
 from doorstate.clouds.augmentation import Augmentation
@@ -43,16 +38,22 @@ from doorstate.training.calibration import abstain_threshold, at_temperature
 from doorstate.training.run_folder import read_json, run_of
 from doorstate.types import DECISION_THRESHOLD, STATES
 
+from .pages.results import NAMES
+from .pages.templates import template
+from .pages.zoo import PAGE, page
+from .publish import rows_of
+from .studies import Asked, read_asked, resolution_results, study_table
+
 REPOSITORY = Path(__file__).resolve().parents[1]
-RESULTS, EXPERIMENTS = REPOSITORY / "results", REPOSITORY / "experiments"
-WEIGHTS = REPOSITORY / "src" / "doorstate" / "deployment" / "weights"
+RESULTS, EXPERIMENTS = REPOSITORY / "results", REPOSITORY / "paper" / "experiments"
+WEIGHTS = REPOSITORY / "src" / "doorstate" / "networks" / "pretrained"
 _MANY = 30e6  # bytes of one set of networks: 19 MB without heads, which take half as much again
 _FEWEST, _LOST = (
     1024,
     0.002,
 )  # default points are no fewer, and lose no more macro-F1 on samples never learned from
 _WRONG_SHARE = (
-    0.05  # of the validation samples that are answered at all; with less, few would be (docs/log.md)
+    0.05  # of the validation samples that are answered at all; with less, few would be (paper/log.md)
 )
 
 
@@ -184,7 +185,7 @@ def _of_weights(experiment: str) -> Callable[[str, int], Evidence]:
             temperature,
             threshold,
             _default_points(experiment, network, trained_points),
-            "worlds_card.md.j2",
+            "mixture_card.md.j2",
             {
                 "error": reliability(calibrated.true, calibrated.scaled).error,
                 "found": _scores(results, network),

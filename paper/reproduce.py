@@ -18,18 +18,18 @@ from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
-from data_sets import commands
-from doorstate_command import REPOSITORY, doorstate
-from published import publish, restore, rows_of
-from studies import read_asked, write_study
-
 from doorstate._jobs import default_workers
 from doorstate.dataset.store import open_dataset
 from doorstate.evaluation.figures import Drawing, draw_dataset
 from doorstate.evaluation.report import write_report
 
-RESULTS, RUNS, EXPERIMENTS = REPOSITORY / "results", REPOSITORY / "runs", REPOSITORY / "experiments"
-PAGES = tuple(Path("docs") / name for name in ("results.md", "related.md", "worlds.md"))
+from .commands import REPOSITORY, doorstate
+from .datasets import commands
+from .publish import publish, restore, rows_of
+from .studies import read_asked, write_study
+
+RESULTS, RUNS, EXPERIMENTS = REPOSITORY / "results", REPOSITORY / "runs", REPOSITORY / "paper" / "experiments"
+PAGES = tuple(Path("docs") / name for name in ("results.md", "related.md", "generalization.md"))
 BESIDE = {"related": "paper"}  # is shown beside the methods of another comparison
 
 
@@ -62,7 +62,7 @@ def run(name: str) -> None:
     for dataset in asked.datasets:
         for command in commands(REPOSITORY / dataset):
             doorstate(command.arguments, command.makes)
-    doorstate(f"{asked.command} experiments/{name}.toml --jobs 2")
+    doorstate(f"{asked.command} paper/experiments/{name}.toml --jobs 2")
     if asked.command == "compare" and asked.content.get("protocol") != "all":
         doorstate(f"report runs/{name}")
 
@@ -106,8 +106,8 @@ def again(network: str, fold: int, name: str = "paper") -> str | None:
 
 def build(root: Path) -> None:
     """Write everything that follows from the committed predictions below `root`."""
-    from results_page import write_pages
-    from worlds_page import write_worlds_page
+    from .pages.generalization import write_worlds_page
+    from .pages.results import write_pages
 
     # spawn: a forked child of a process that runs BLAS threads can hang.
     with ProcessPoolExecutor(default_workers(), multiprocessing.get_context("spawn")) as pool:
@@ -158,7 +158,7 @@ def check() -> str | None:
 
 def _is_finished(comparison: Path) -> bool:
     """Whether all runs are there, be it that they were restored: what they begin with is then not needed."""
-    from results_page import unfinished_runs
+    from .pages.results import unfinished_runs
 
     return (comparison / "comparison.json").is_file() and not unfinished_runs(comparison)
 
@@ -169,7 +169,7 @@ def _draw_dataset(folder: Path) -> dict[str, Drawing]:
 
 def _comparisons() -> Iterator[tuple[list[Path], int]]:
     """Published comparisons, those shown as one together, and how many folds all have finished; at least one."""
-    from results_page import whole_folds
+    from .pages.results import whole_folds
 
     for path in sorted(RESULTS.glob("*/comparison.json")):
         beside = BESIDE.get(path.parent.name)

@@ -10,16 +10,16 @@ import hashlib
 from pathlib import Path
 from typing import NamedTuple
 
-from results_page import NAMES
-from templates import template
-
 from doorstate._files import write_text
 from doorstate.inference.predictor import packaged_networks, packaged_weights
 from doorstate.networks import create_network, list_networks
 from doorstate.networks.card import WeightsCard
 from doorstate.networks.weights import read_card
 
-PAGE = Path(__file__).resolve().parents[1] / "docs" / "zoo.md"
+from .results import NAMES
+from .templates import template
+
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "zoo.md"
 
 
 class Network(NamedTuple):
