@@ -10,7 +10,7 @@ from pathlib import Path
 from doorstate._files import write_csv
 from doorstate.dataset.splits import read_splits
 from doorstate.dataset.store import MANIFEST, open_dataset
-from doorstate.inference.predictor import packaged_weights
+from doorstate.networks.packaged import packaged_weights
 from doorstate.training.run_folder import read_json
 
 # Large, or of use only to a running training.

@@ -28,7 +28,8 @@ from benchmarks.onnx import onnx_table
 from doorstate._jobs import no_progress
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import ConfigError, RunError
-from doorstate.inference.predictor import Prediction, packaged_weights
+from doorstate.inference.predictor import Prediction
+from doorstate.networks.packaged import packaged_weights
 from doorstate.rules import list_rules
 from doorstate.types import DoorState
 
@@ -211,7 +212,7 @@ def test_knn_times_three_methods(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("networks", "--networks", "pontnet"), "there is no network 'pontnet': did you mean 'pointnet'?"),
+        (("networks", "--networks", "pontnet"), "unknown network 'pontnet'; did you mean 'pointnet'?"),
         (("networks", "--points", "64"), "--points 64: give whole numbers from 128 up, separated by commas"),
         (("profile", "--form", "quick"), "--form quick: choose plain, fast or both"),
     ],

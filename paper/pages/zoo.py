@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from doorstate._files import write_text
-from doorstate.inference.predictor import packaged_networks, packaged_weights
 from doorstate.networks import create_network, list_networks
 from doorstate.networks.card import WeightsCard
+from doorstate.networks.packaged import packaged_networks, packaged_weights
 from doorstate.networks.weights import read_card
 
 from .results import NAMES

@@ -19,6 +19,7 @@ DoorstateError
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from difflib import get_close_matches
 from functools import partial
 from typing import TYPE_CHECKING, Any, Self
 
@@ -159,6 +160,23 @@ def missing_extra(feature: str, *packages: str) -> MissingExtraError:
     return MissingExtraError(
         f"{feature} needs packages that are not installed: pip install {' '.join(packages)}"
     )
+
+
+def unknown_name(
+    kind: str, name: str, known: Iterable[str], error: type[DoorstateError] = ConfigError
+) -> DoorstateError:
+    """Return the error of a name that does not exist, with the closest known name or all of them.
+
+    Args:
+        kind: of thing that is named, such as "network".
+        name: the unknown name.
+        known: all known names.
+        error: class of the error.
+    """
+    known = list(known)
+    close = get_close_matches(name, known, n=1)
+    hint = f"did you mean {close[0]!r}?" if close else f"known are {', '.join(known) or 'none'}"
+    return error(f"unknown {kind} {name!r}", hint=hint)
 
 
 def first_validation_error(error: ValidationError, fields: Iterable[str] = ()) -> str:

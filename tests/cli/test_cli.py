@@ -18,9 +18,9 @@ from PIL import Image
 
 import doorstate
 from doorstate.dataset.store import PreparedDataset
-from doorstate.inference.predictor import packaged_networks
 from doorstate.io.pcd import write_pcd
 from doorstate.networks import list_networks
+from doorstate.networks.packaged import packaged_networks
 from doorstate.rules import list_rules
 
 Run = Callable[..., tuple[int, str, str]]

@@ -141,7 +141,7 @@ def test_folders_of_states_are_enough_and_the_same_files_come_out_twice(
         (("--group", "building"), "no column 'building'"),
         (("--rule", "plane_state", "--rule", "plane_state"), "plane_state is asked for twice"),
         (("--rule", "guess"), "guess"),
-        (("--network", "nobody"), "no weights for 'nobody'"),
+        (("--network", "nobody"), "unknown packaged weights 'nobody'"),
         (("--layout", "kitti"), "no layout 'kitti'"),
         (("--layout", "deepdoors2", "--roll", "90"), "--layout says how its files are read"),
         (("--all",), "--all is for the page of --out"),

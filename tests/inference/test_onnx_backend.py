@@ -141,7 +141,7 @@ def test_without_onnx_export_names_its_packages(
 
 def test_export_refuses_what_does_not_fit(run: Run, weights: Path) -> None:
     assert "weights of pointnet, not of dgcnn" in run("export", "dgcnn", "--weights", weights)[2]
-    assert "no weights for 'mvcnn' in the package" in run("export", "mvcnn")[2]
+    assert "unknown packaged weights 'mvcnn'" in run("export", "mvcnn")[2]
     assert "by the ending .onnx" in run("export", "pointnet2", "--out", "x.pb")[2]
 
 

@@ -16,12 +16,13 @@ import torch
 from doorstate.clouds.preparation import CloudSpec, normalize, prepare_cloud
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import CloudContentError, ConfigError, WeightsError
-from doorstate.inference.predictor import Predictor, packaged_networks, packaged_weights
+from doorstate.inference.predictor import Predictor
 from doorstate.inference.rule_predictor import RulePredictor
 from doorstate.networks import create_network
 from doorstate.networks.base import PointNetwork
 from doorstate.networks.decoding import in_metres
 from doorstate.networks.heads import HEADS, add_heads, answers
+from doorstate.networks.packaged import packaged_networks, packaged_weights
 from doorstate.networks.weights import WeightsCard, save_weights
 from doorstate.simulation.frames import replay
 from doorstate.simulation.manifest import unflatten
@@ -142,7 +143,7 @@ def test_weights_load_by_path_and_by_name(tmp_path: Path) -> None:
     fewer = WeightsCard(network="pointcnn", num_points=256, default_points=192)
     save_weights(path, create_network("pointcnn"), fewer)
     assert Predictor.load(path).points == 192
-    with pytest.raises(WeightsError, match=r"no weights for 'nonet' in the package \(there are: .*pointnet2"):
+    with pytest.raises(WeightsError, match=r"unknown packaged weights 'nonet'"):
         Predictor.load("nonet")
 
 

@@ -3,6 +3,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import pytest
 import torch
 from torch import Tensor
@@ -49,23 +52,46 @@ def test_names() -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_number_of_parameters(name: str) -> None:
-    counts = tuple(sum(p.numel() for p in create_network(name, classes).parameters()) for classes in (3, 40))
+    counts = tuple(
+        sum(p.numel() for p in create_network(name, num_classes=classes).parameters()) for classes in (3, 40)
+    )
     assert counts == COUNTS[name]
 
 
 def test_parameters_of_multi_scale_grouping() -> None:
     counts = [
-        sum(p.numel() for p in create_network("pointnet2", c, variant="msg").parameters()) for c in (3, 40)
+        sum(p.numel() for p in create_network("pointnet2", num_classes=c, variant="msg").parameters())
+        for c in (3, 40)
     ]
     assert counts == [1_737_859, 1_747_368]
 
 
-def test_a_typo_is_told_the_name_it_meant() -> None:
-    with pytest.raises(ConfigError, match="'pointnet3': did you mean 'pointnet"):
+def test_pretrained_network_has_packaged_weights_and_heads() -> None:
+    network = create_network("pointnet2", pretrained=True)
+    assert not network.training
+    assert "door" in network.heads
+    other = create_network("pointnet2", pretrained="ogurob-pointnet2")
+    assert not torch.equal(network.level1.mlps[0].pool.linear.weight, other.level1.mlps[0].pool.linear.weight)
+    with pytest.raises(ConfigError, match="are for pointnet, not dgcnn"):
+        create_network("dgcnn", pretrained="ogurob-pointnet")
+    with pytest.raises(ConfigError):
+        create_network("dgcnn", pretrained=True, k=3)
+
+
+def test_heavy_modules_are_imported_on_use() -> None:
+    code = (
+        "import sys, doorstate.networks.card, doorstate.networks.decoding, doorstate.networks.packaged; "
+        "sys.exit('torch' in sys.modules)"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_unknown_names_suggest_the_closest() -> None:
+    with pytest.raises(ConfigError, match="unknown network 'pointnet3'; did you mean 'pointnet"):
         create_network("pointnet3")
     with pytest.raises(ConfigError, match="known are pointnet, pointnet2"):
         create_network("zzz")
-    with pytest.raises(ConfigError, match="no option 'kk': known are k"):
+    with pytest.raises(ConfigError, match="unknown dgcnn option 'kk'; did you mean 'k'"):
         create_network("dgcnn", kk=3)
 
 
@@ -80,7 +106,7 @@ def test_logits_at_every_resolution(network: PointNetwork, num_points: int) -> N
 
 @pytest.mark.parametrize("name", NAMES)
 def test_number_of_classes(name: str) -> None:
-    network = create_network(name, 5)
+    network = create_network(name, num_classes=5)
     loss, logits = network.training_loss(clouds(128), LABELS)
     assert loss.shape == ()
     assert logits.shape == (2, 5)

@@ -210,7 +210,7 @@ def test_a_joined_layer_is_a_layer_on_both() -> None:
 
 def test_errors_name_what_is_known() -> None:
     network = create_network("point2sequence")
-    with pytest.raises(ConfigError, match="no head 'angel': did you mean 'angle'"):
+    with pytest.raises(ConfigError, match="unknown head 'angel'; did you mean 'angle'"):
         add_heads(network, ["angel"])
     with pytest.raises(ConfigError, match="Point2Sequence has no per-point branch"):
         add_heads(network, ["parts"])

@@ -13,7 +13,8 @@ import pytest
 from doorstate.dataset.splits import draw_splits, write_splits
 from doorstate.dataset.store import PreparedDataset
 from doorstate.evaluation.results import load_results
-from doorstate.inference.predictor import Predictor, packaged_networks, packaged_weights
+from doorstate.inference.predictor import Predictor
+from doorstate.networks.packaged import packaged_networks, packaged_weights
 from doorstate.networks.weights import read_card
 from doorstate.training.calibration import at_temperature
 from doorstate.training.comparison import Experiment, compare, prepare_comparison

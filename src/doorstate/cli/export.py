@@ -41,8 +41,8 @@ def export(
     from doorstate.cli.console import out as stdout
     from doorstate.cli.console import progress_bar
     from doorstate.inference.export import TOLERANCE, check_installed, export_onnx
-    from doorstate.inference.predictor import packaged_weights
     from doorstate.inference.reference_clouds import reference_clouds
+    from doorstate.networks.packaged import packaged_weights
     from doorstate.networks.weights import load_weights
 
     path = out or Path(f"{network}{'-int8' if int8 else ''}.onnx")

@@ -104,7 +104,7 @@ def info(as_json: Annotated[bool, typer.Option("--json", help="As one JSON objec
     """
     from doorstate.cli.console import print_table
     from doorstate.clouds.sampling import HAS_FPSAMPLE
-    from doorstate.inference.predictor import packaged_networks
+    from doorstate.networks.packaged import packaged_networks
     from doorstate.rules import create_rule, list_rules
     from doorstate.training.environment import describe_environment
 

@@ -7,7 +7,6 @@ import statistics
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
@@ -33,6 +32,7 @@ from doorstate.errors import (
 from doorstate.inference.gate import Gate
 from doorstate.inference.onnx_backend import OnnxBackend
 from doorstate.networks.card import WeightsCard
+from doorstate.networks.packaged import packaged_weights
 from doorstate.rules.base import Detection
 from doorstate.types import DECISION_THRESHOLD, STATES, DoorState, Points
 
@@ -333,27 +333,3 @@ def median_milliseconds(predictor: Predictor, clouds: Sequence[Points], repeats:
     """Median time over clouds and repeats, after one call that warms up."""
     predictor(clouds[0])
     return statistics.median(predictor(cloud).milliseconds for _ in range(repeats) for cloud in clouds)
-
-
-def packaged_networks() -> list[str]:
-    """Names of the weights that come with the package: a network's, or `SET-NETWORK`."""
-    return sorted(path.stem for path in _packaged("").parent.glob("*.safetensors"))
-
-
-def packaged_weights(network: str) -> Path:
-    """Path of the weights that come with the package.
-
-    Raises:
-        WeightsError: there are none for this network.
-    """
-    path = _packaged(network)
-    if not path.is_file():
-        known = ", ".join(packaged_networks()) or "none"
-        raise WeightsError(
-            f"no weights for {network!r} in the package (there are: {known}); give --weights FILE"
-        )
-    return path
-
-
-def _packaged(network: str) -> Path:
-    return Path(str(resources.files("doorstate.networks"))) / "pretrained" / f"{network}.safetensors"

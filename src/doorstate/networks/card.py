@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from pydantic import Field
 
 from doorstate import __version__
@@ -15,7 +17,7 @@ class WeightsCard(FrozenModel):
     """What a weights file says of itself."""
 
     network: str
-    network_options: dict[str, object] = Field(default_factory=dict)
+    network_options: dict[str, Any] = Field(default_factory=dict)
     num_points: int  # trained with
     default_points: int | None = Field(default=None, gt=0)  # fewer, that lose nothing
     heads: tuple[str, ...] = ()  # answers besides the state

@@ -9,13 +9,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from difflib import get_close_matches
 
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from doorstate.errors import ConfigError
+from doorstate.errors import unknown_name
 from doorstate.networks.base import Neighbourhoods, PointNetwork
 from doorstate.networks.kernels.ops import at_least_float32, full_precision
 from doorstate.networks.layers import Dense, glorot
@@ -143,10 +142,7 @@ def add_heads(network: PointNetwork, names: Sequence[str], num_parts: int = len(
         elif name in HEADS:
             network.heads[name] = HEADS[name](network.feature_size)
         else:
-            known = [*HEADS, PARTS]
-            close = get_close_matches(name, known, n=1)
-            hint = f"did you mean {close[0]!r}?" if close else f"known are {', '.join(known)}"
-            raise ConfigError(f"there is no head {name!r}: {hint}")
+            raise unknown_name("head", name, [*HEADS, PARTS])
 
 
 def answers(

@@ -60,7 +60,7 @@ def load_weights(path: Path) -> tuple[PointNetwork, WeightsCard]:
     if card.states != STATES or card.scale_m != SCALE_M:
         raise WeightsError(f"{path}: made for states {card.states} at scale {card.scale_m} m")
     try:
-        network = create_network(card.network, len(card.states), **card.network_options)
+        network = create_network(card.network, num_classes=len(card.states), **card.network_options)
         add_heads(network, card.heads)
         load_into(network, path)
     except RuntimeError as error:

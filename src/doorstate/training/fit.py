@@ -395,7 +395,7 @@ class _Trainer:
 
 
 def _build(config: RunConfig) -> PointNetwork:
-    network = create_network(config.network, len(STATES), **_network_options(config))
+    network = create_network(config.network, num_classes=len(STATES), **_network_options(config))
     add_heads(network, config.heads)
     return network
 
