@@ -114,7 +114,7 @@ def _help_of_commands() -> list[str]:
 
 def _model_cards() -> str:
     """The cards that lie beside the weights in the package, a level deeper."""
-    cards = sorted((REPOSITORY / "src/doorstate/deployment/weights").glob("*.md"))
+    cards = sorted((REPOSITORY / "src/doorstate/networks/pretrained").glob("*.md"))
     return "".join(
         f"\n(card-{card.stem})=\n" + re.sub("^#", "##", card.read_text(encoding="utf-8"), flags=re.MULTILINE)
         for card in cards

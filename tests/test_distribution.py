@@ -15,6 +15,7 @@ import pytest
 from packaging.metadata import Metadata
 
 from doorstate import __version__
+from doorstate.networks import list_networks
 
 pytest.importorskip("build")
 
@@ -52,7 +53,7 @@ def test_both_hold_the_package_and_nothing_else(built: Path) -> None:
         if path.is_file() and "__pycache__" not in path.parts
     }
     assert {"doorstate/py.typed", "doorstate/evaluation/templates/report.html.j2"} <= sources
-    assert any(name.startswith("doorstate/deployment/weights/") for name in sources)
+    assert any(name.startswith("doorstate/networks/pretrained/") for name in sources)
     with zipfile.ZipFile(wheel) as archive:
         held = {name for name in archive.namelist() if ".dist-info/" not in name}
         about = {name.partition(".dist-info/")[2] for name in archive.namelist()} - {""}
@@ -102,3 +103,17 @@ def test_the_unpacked_wheel_answers(built: Path, simulated_folder: Path, tmp_pat
     )
     assert said.startswith(str(tmp_path))
     assert "│  open │" in said
+
+
+@pytest.mark.slow
+def test_the_wheel_stays_small(built: Path) -> None:
+    (wheel,) = built.glob("*.whl")
+    assert wheel.stat().st_size <= 30e6
+
+
+def test_packaged_weights_stay_small() -> None:
+    weights = {
+        path.stem: path.stat().st_size for path in (PACKAGE / "networks/pretrained").glob("*.safetensors")
+    }
+    assert set(weights) == {"pointnet2", *(f"ogurob-{name}" for name in list_networks())}
+    assert sum(weights.values()) <= 25e6

@@ -111,7 +111,7 @@ def test_pip_install_brings_weights_templates_and_the_typed_marker(tmp_path: Pat
     for name in (
         "py.typed",
         "evaluation/templates/report.html.j2",
-        "deployment/templates/view.html.j2",
-        "deployment/weights/pointnet2.safetensors",
+        "viewer/templates/view.html.j2",
+        "networks/pretrained/pointnet2.safetensors",
     ):
         assert (package / name).is_file(), name

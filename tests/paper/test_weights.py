@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from pathlib import Path
 from types import ModuleType
 
@@ -14,7 +13,6 @@ from doorstate.dataset.splits import draw_splits, write_splits
 from doorstate.dataset.store import PreparedDataset
 from doorstate.evaluation.results import load_results
 from doorstate.inference.predictor import Predictor
-from doorstate.networks.packaged import packaged_networks, packaged_weights
 from doorstate.networks.weights import read_card
 from doorstate.training.calibration import at_temperature
 from doorstate.training.comparison import Experiment, compare, prepare_comparison
@@ -44,15 +42,6 @@ def package(tool: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
         monkeypatch.setattr(tool, name, tmp_path / folder)
     monkeypatch.setattr(tool, "PAGE", tmp_path / "zoo.md")
     return tmp_path / "package"
-
-
-def test_the_package_stays_small() -> None:
-    sets: Counter[str] = Counter()
-    for name in packaged_networks():
-        sets[name.rpartition("-")[0]] += packaged_weights(name).stat().st_size
-    assert sets.pop("ogurob") <= 25e6
-    assert sets.pop("") <= 30e6, "with heads"
-    assert not sets
 
 
 def test_weights_are_packaged_with_a_temperature_and_a_card(

@@ -69,7 +69,7 @@ def predict(
       doorstate predict --frame optical --json recordings/
       doorstate predict recordings/ --out states.csv
       doorstate predict --rule plane_state cloud.pcd
-      doorstate predict --network dgcnn --budget-ms 33 recordings/
+      doorstate predict --network ogurob-dgcnn --budget-ms 33 recordings/
       doorstate predict depth.png --fx 385.9 --fy 385.4 --cx 317.8 --cy 243.7
       doorstate predict depth.png --intrinsics camera_info.yaml --roll 90
       doorstate predict --bag run.bag --topic /camera/depth/points --frame optical --out run.csv
