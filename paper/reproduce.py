@@ -75,7 +75,7 @@ def again(network: str, fold: int, name: str = "paper") -> str | None:
     """
     from doorstate.cli.console import live_runs
     from doorstate.evaluation.metrics import mean_and_deviation
-    from doorstate.training.comparison import Run, load_experiment, train_one
+    from doorstate.training.comparison import RunSpec, load_experiment, train_fold
     from doorstate.training.run_folder import RunFolder, run_of
 
     experiment = load_experiment(EXPERIMENTS / f"{name}.toml", {})
@@ -87,9 +87,9 @@ def again(network: str, fold: int, name: str = "paper") -> str | None:
     spread = max(2 * deviation, 2 / published[fold].read_metrics()["test_samples"])
     folder = RunFolder(RUNS / "again" / name / network / f"fold{fold}")
     with live_runs(
-        [Run(network, fold, folder)], {network: experiment.recipe_of(network)}, experiment.num_points, 1
+        [RunSpec(network, fold, folder)], {network: experiment.recipe_of(network)}, experiment.num_points, 1
     ):
-        found = train_one(
+        found = train_fold(
             experiment,
             folder.path,
             open_dataset(Path(experiment.dataset)),

@@ -11,7 +11,7 @@ import pytest
 from rich.console import Console
 
 from doorstate.cli import console
-from doorstate.training.comparison import Run
+from doorstate.training.comparison import RunSpec
 from doorstate.training.recipes import Recipe, Stage
 from doorstate.training.run_folder import RunFolder
 
@@ -34,7 +34,7 @@ def finished(folder: Path) -> RunFolder:
     return run
 
 
-def shown(runs: list[Run], jobs: int) -> str:
+def shown(runs: list[RunSpec], jobs: int) -> str:
     screen = Console(file=io.StringIO(), width=100)
     screen.print(console._RunWatch(runs, RECIPES, 512, jobs).table())
     assert isinstance(screen.file, io.StringIO)
@@ -43,10 +43,10 @@ def shown(runs: list[Run], jobs: int) -> str:
 
 def test_the_live_table_says_what_is_done_and_how_long_the_rest_takes(tmp_path: Path) -> None:
     runs = [
-        Run("pointnet", 0, finished(tmp_path / "a")),
-        Run("pointnet", 1, RunFolder(tmp_path / "b")),
-        Run("dgcnn", 0, begun(tmp_path / "c")),
-        Run("dgcnn", 1, RunFolder(tmp_path / "d")),
+        RunSpec("pointnet", 0, finished(tmp_path / "a")),
+        RunSpec("pointnet", 1, RunFolder(tmp_path / "b")),
+        RunSpec("dgcnn", 0, begun(tmp_path / "c")),
+        RunSpec("dgcnn", 1, RunFolder(tmp_path / "d")),
     ]
     text = shown(runs, jobs=1)
     assert "0.9877" in text
@@ -57,17 +57,17 @@ def test_the_live_table_says_what_is_done_and_how_long_the_rest_takes(tmp_path: 
 
 
 def test_without_a_finished_epoch_nothing_is_promised(tmp_path: Path) -> None:
-    text = shown([Run("dgcnn", 0, RunFolder(tmp_path / "d"))], jobs=1)
+    text = shown([RunSpec("dgcnn", 0, RunFolder(tmp_path / "d"))], jobs=1)
     assert "left" not in text
 
 
 def test_where_nobody_looks_finished_runs_are_counted(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    with console.live_runs([Run("dgcnn", 0, RunFolder(tmp_path))], RECIPES, 512, 1) as progress:
+    with console.live_runs([RunSpec("dgcnn", 0, RunFolder(tmp_path))], RECIPES, 512, 1) as progress:
         progress(1, 4)
     assert capsys.readouterr().err == "1 of 4 runs finished\n"
-    with console.live_runs([Run("dgcnn", 0, begun(tmp_path))], RECIPES, 512, 1) as progress:
+    with console.live_runs([RunSpec("dgcnn", 0, begun(tmp_path))], RECIPES, 512, 1) as progress:
         progress(1, 4)
     assert capsys.readouterr().err == "1 of 4 runs finished, about 6 min left\n"
 
@@ -76,7 +76,7 @@ def test_a_log_hears_of_long_runs_before_they_end(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(console, "_LINE_EVERY_S", 0.01)
-    with console.live_runs([Run("dgcnn", 0, begun(tmp_path))], RECIPES, 512, 1):
+    with console.live_runs([RunSpec("dgcnn", 0, begun(tmp_path))], RECIPES, 512, 1):
         time.sleep(0.1)
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) > 1
@@ -86,7 +86,7 @@ def test_a_log_hears_of_long_runs_before_they_end(
 def test_a_run_that_tested_nothing_is_done(tmp_path: Path) -> None:
     run = RunFolder(tmp_path)
     run.finish({"seconds": 1.0})
-    assert "done" in shown([Run("pointnet", 0, run)], jobs=1)
+    assert "done" in shown([RunSpec("pointnet", 0, run)], jobs=1)
 
 
 def test_bars_print_nothing_where_nobody_looks(capsys: pytest.CaptureFixture[str]) -> None:

@@ -108,7 +108,7 @@ def add_found() -> Callable[..., None]:
     def add(folder: Path, method: str, sample_id: str, found: list[list[Any]]) -> None:
         for path in (folder / "runs" / method).rglob("predictions.csv"):
             if f"\n{sample_id}," in path.read_text():
-                record = {"sample_id": sample_id, "found": found}
+                record = {"sample_id": sample_id, "detections": found}
                 path.with_name("detections.jsonl").write_text(json.dumps(record) + "\n")
 
     return add

@@ -25,12 +25,12 @@ def test_no_file_is_nothing_found(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "line",
-    ["{", '{"sample_id": "a"}', '["a"]', '{"sample_id": "a", "found": [["wall", [[1, 2]]]]}', "3"],
+    ["{", '{"sample_id": "a"}', '["a"]', '{"sample_id": "a", "detections": [["wall", [[1, 2]]]]}', "3"],
 )
 def test_a_damaged_line_is_named(tmp_path: Path, line: str) -> None:
     path = tmp_path / "detections.jsonl"
-    path.write_text('{"sample_id": "b", "found": []}\n' + line + "\n")
-    with pytest.raises(RunError, match=r"found\.jsonl, line 2: no record"):
+    path.write_text('{"sample_id": "b", "detections": []}\n' + line + "\n")
+    with pytest.raises(RunError, match=r"detections\.jsonl, line 2"):
         read_detections(path)
 
 

@@ -66,7 +66,7 @@ def comparison(dataset: PreparedDataset, folder: Path, wrong_hinges: int = 0) ->
                 left ^= hinged <= wrong_hinges
             answer |= {"p_door": str(p_door), "p_hinge_left": str(float(left))}
             said.append({"sample_id": row["sample_id"]} | answer)
-        write_csv(run / "answers.csv", said)
+        write_csv(run / "head_outputs.csv", said)
         write_csv(
             run / "predictions.csv",
             [

@@ -22,7 +22,7 @@ from doorstate.dataset.splits import read_splits
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import ConfigError, DatasetError, RunError
 from doorstate.networks.weights import read_card
-from doorstate.training.comparison import Experiment, compare, load_experiment, prepare_comparison, runs_of
+from doorstate.training.comparison import Experiment, compare, load_experiment, plan_runs, prepare_comparison
 from doorstate.training.resolution import load_study
 from doorstate.training.transfer import load_transfer
 
@@ -211,7 +211,7 @@ def test_scenes_without_a_door_are_refused_before_anything_is_written(
 
 def test_runs_go_fold_by_fold(small_dataset: PreparedDataset, tmp_path: Path) -> None:
     both = experiment(small_dataset, networks=("pointnet", "dgcnn"))
-    assert [(run.network, run.fold) for run in runs_of(both, tmp_path)] == [
+    assert [(run.method, run.fold) for run in plan_runs(both, tmp_path)] == [
         ("pointnet", 0),
         ("dgcnn", 0),
         ("pointnet", 1),

@@ -400,7 +400,7 @@ def test_heads_are_trained_jointly_and_answer_in_metres(
     run = config(network=network, heads=heads, recipe=recipe, protocol="by-scene", num_points=160)
     metrics = fit(run, scene_dataset, scene_roles, tmp_path)
     tested = [sample for sample, role in scene_roles.items() if role == "test"]
-    answers = read_csv(tmp_path / "answers.csv")
+    answers = read_csv(tmp_path / "head_outputs.csv")
     assert [row["sample_id"] for row in answers] == tested
     assert set(answers[0]) == {
         "sample_id",

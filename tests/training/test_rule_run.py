@@ -60,7 +60,7 @@ def test_answers_are_those_of_the_rule_on_raw_frames(doors: PreparedDataset, tmp
     found = [json.loads(line) for line in (tmp_path / "detections.jsonl").read_text().splitlines()]
     assert {each["sample_id"] for each in found} == missed
     for each in found:
-        for name, points in each["found"]:
+        for name, points in each["detections"]:
             assert name
             assert np.shape(points)[1:] == (3,)
 
@@ -92,7 +92,7 @@ def test_rules_stand_beside_networks_in_a_comparison(doors: PreparedDataset, tmp
         recipe_changes={"epochs": 1, "batch_size": 8, "precision": "fp32"},
     )
     found = compare(experiment, tmp_path / "c")
-    assert [run["network"] for run in found] == ["pointnet", "angle_bins", "wall_leaf_angle"]
+    assert [run["method"] for run in found] == ["pointnet", "angle_bins", "wall_leaf_angle"]
     with pytest.raises(ConfigError, match="there is no rule 'angle'"):
         experiment.model_copy(update={"rules": ("angle",)}).check()
 

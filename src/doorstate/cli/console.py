@@ -23,7 +23,7 @@ from rich.table import Table
 from rich.text import Text
 
 if TYPE_CHECKING:
-    from doorstate.training.comparison import Run
+    from doorstate.training.comparison import RunSpec
     from doorstate.training.recipes import Recipe
 
 # Names of files are printed as they are: brackets and colons in them mean nothing.
@@ -67,7 +67,7 @@ def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]
 
 @contextmanager
 def live_runs(
-    runs: Sequence[Run], recipes: Mapping[str, Recipe], num_points: int, jobs: int
+    runs: Sequence[RunSpec], recipes: Mapping[str, Recipe], num_points: int, jobs: int
 ) -> Iterator[Callable[[int, int], None]]:
     """Show how far every run is, read from the run folders once a second; yields `update(done, total)`.
 
@@ -105,7 +105,7 @@ def _every(seconds: float, act: Callable[[], None]) -> Iterator[None]:
 
 class _RunWatch:
     def __init__(
-        self, runs: Sequence[Run], recipes: Mapping[str, Recipe], num_points: int, jobs: int
+        self, runs: Sequence[RunSpec], recipes: Mapping[str, Recipe], num_points: int, jobs: int
     ) -> None:
         self._runs, self._recipes, self._num_points, self._jobs = runs, recipes, num_points, jobs
 
@@ -117,8 +117,8 @@ class _RunWatch:
         table.add_column("network")
         for fold in folds:
             table.add_column(f"fold {fold}", justify="right", min_width=11)
-        for network in dict.fromkeys(run.network for run in self._runs):
-            cells = [self._cell(run) for run in self._runs if run.network == network]
+        for network in dict.fromkeys(run.method for run in self._runs):
+            cells = [self._cell(run) for run in self._runs if run.method == network]
             table.add_row(network, *cells)
         return table
 
@@ -129,13 +129,13 @@ class _RunWatch:
         seconds = eta_seconds(self._runs, self._recipes, self._num_points)
         return f", about {seconds / self._jobs / 60:.0f} min left" if seconds else ""
 
-    def _cell(self, run: Run) -> Text:
+    def _cell(self, run: RunSpec) -> Text:
         if run.folder.finished:
             score = run.folder.read_metrics().get("test_macro_f1")
             return Text("done" if score is None else f"{score:.4f}", "green")
         position = run.folder.read_position()
         if not position:
             return Text("-", "dim")
-        if run.network not in self._recipes:  # a rule
+        if run.method not in self._recipes:  # a rule
             return Text(f"{position:.0%}")
-        return Text(f"{position:.1f} / {self._recipes[run.network].epochs}")
+        return Text(f"{position:.1f} / {self._recipes[run.method].epochs}")

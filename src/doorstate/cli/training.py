@@ -42,7 +42,7 @@ def train(
     from doorstate.cli.console import out as stdout
     from doorstate.dataset.splits import draw_splits, write_splits
     from doorstate.dataset.store import open_dataset
-    from doorstate.training.comparison import Run, load_experiment, train_one
+    from doorstate.training.comparison import RunSpec, load_experiment, train_fold
     from doorstate.training.run_folder import RunFolder
 
     overrides = {
@@ -62,9 +62,9 @@ def train(
     splits = out / "splits.csv"
     if not splits.is_file():
         write_splits(splits, draw_splits(dataset.rows, protocol, seed))
-    runs = [Run(network, fold, RunFolder(out))]
+    runs = [RunSpec(network, fold, RunFolder(out))]
     with live_runs(runs, {network: experiment.recipe_of(network)}, points, 1):
-        metrics = train_one(experiment, out, dataset, network, fold, splits)
+        metrics = train_fold(experiment, out, dataset, network, fold, splits)
     tested = f"trained on all {metrics['train_samples']} clouds"
     if metrics["test_samples"]:
         tested = (
@@ -184,10 +184,10 @@ def compare_live(experiment: Experiment, folder: Path, jobs: int) -> list[dict[s
     """Run a comparison and show how far it is; metrics of every run."""
     from doorstate.cli.console import live_runs
     from doorstate.training.comparison import compare as run_comparison
-    from doorstate.training.comparison import runs_of
+    from doorstate.training.comparison import plan_runs
 
     recipes = {network: experiment.recipe_of(network) for network in experiment.networks}
-    with live_runs(runs_of(experiment, folder), recipes, experiment.num_points, jobs) as progress:
+    with live_runs(plan_runs(experiment, folder), recipes, experiment.num_points, jobs) as progress:
         return run_comparison(experiment, folder, jobs, progress)
 
 
@@ -196,5 +196,5 @@ def _names(text: str | None) -> tuple[str, ...] | None:
 
 
 def _score_row(network: str, metrics: list[dict[str, Any]]) -> list[str]:
-    scores = [run["test_macro_f1"] for run in metrics if run["network"] == network]
+    scores = [run["test_macro_f1"] for run in metrics if run["method"] == network]
     return [network, *(f"{score:.4f}" for score in scores), f"{sum(scores) / len(scores):.4f}"]

@@ -33,7 +33,7 @@ def read_detections(path: Path) -> Detections:
     for number, line in enumerate(path.read_text(encoding="utf-8").splitlines() if path.exists() else (), 1):
         try:
             record = json.loads(line)
-            sample, shapes = _LINE.validate_python((record["sample_id"], record["found"]))
+            sample, shapes = _LINE.validate_python((record["sample_id"], record["detections"]))
         except (ValueError, KeyError, TypeError, ValidationError) as error:
             raise RunError(
                 f"{path}, line {number}: no record of found shapes; run this rule again"

@@ -249,7 +249,7 @@ def _find_dataset(comparison_folder: Path, dataset: str) -> Path:
 
 def _read_run(folder: RunFolder, network: str, fold: int) -> Run:
     predictions = _read_predictions(folder.predictions, fold)
-    answers = _read_answers(folder.answers) if folder.answers.exists() else None
+    answers = _read_answers(folder.head_outputs) if folder.head_outputs.exists() else None
     if answers is not None and "opening_angle_deg" in answers.columns:
         said = dict(zip(answers.sample_ids, answers.columns["opening_angle_deg"].tolist(), strict=True))
         angles_deg = np.array([said.get(sample_id, math.nan) for sample_id in predictions.sample_ids])

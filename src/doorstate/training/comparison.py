@@ -111,10 +111,10 @@ class Experiment(FrozenModel):
             create_rule(rule)
 
 
-class Run(NamedTuple):
-    """One network or rule on one fold, and where it lies."""
+class RunSpec(NamedTuple):
+    """One network or rule on one fold, and the folder of its files."""
 
-    network: str
+    method: str
     fold: int
     folder: RunFolder
 
@@ -174,10 +174,10 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
         raise ConfigError(f"{path}: cannot be read as {what} ({error})") from error
 
 
-def runs_of(experiment: Experiment, folder: Path) -> list[Run]:
+def plan_runs(experiment: Experiment, folder: Path) -> list[RunSpec]:
     """All runs, fold by fold, so that a partial comparison compares all networks on the same folds."""
     return [
-        Run(network, fold, run_of(folder, network, fold))
+        RunSpec(network, fold, run_of(folder, network, fold))
         for fold in range(experiment.folds)
         for network in experiment.methods
     ]
@@ -201,9 +201,9 @@ def compare(
         RunError: the folder holds another comparison.
     """
     prepare_comparison(experiment, folder)
-    runs = runs_of(experiment, folder)
+    runs = plan_runs(experiment, folder)
     share = max(1, default_workers() // jobs) if jobs > 1 else None
-    pieces = [_Piece(experiment, folder, run.network, run.fold, share) for run in runs]
+    pieces = [_Piece(experiment, folder, run.method, run.fold, share) for run in runs]
     run_pieces(_run_piece, pieces, [run.folder.metrics for run in runs], jobs, progress)
     return [run.folder.read_metrics() for run in runs]
 
@@ -274,7 +274,7 @@ def _check_unseen(splits: Sequence[Mapping[str, Role]], start_from: Path) -> Non
                 )
 
 
-def train_one(
+def train_fold(
     experiment: Experiment,
     folder: Path,
     dataset: PreparedDataset,
@@ -333,7 +333,7 @@ def _weights_before(experiment: Experiment, network: str, fold: int) -> str | No
 def answer_one(
     experiment: Experiment, folder: Path, dataset: PreparedDataset, rule: str, fold: int, splits_path: Path
 ) -> dict[str, Any]:
-    """Ask one rule of an experiment for one fold; arguments and result are those of `train_one`.
+    """Ask one rule of an experiment for one fold; arguments and result are those of `train_fold`.
 
     Raises:
         DatasetError, RunError: as of `rule_run.answer`.
@@ -349,7 +349,7 @@ def answer_one(
 
 
 def _run_piece(piece: _Piece, path: Path) -> None:
-    run = answer_one if piece.network in piece.experiment.rules else train_one
+    run = answer_one if piece.network in piece.experiment.rules else train_fold
     with threads(piece.threads):
         dataset = open_dataset(Path(piece.experiment.dataset))
         run(piece.experiment, path.parent, dataset, piece.network, piece.fold, piece.folder / "splits.csv")

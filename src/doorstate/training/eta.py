@@ -7,13 +7,13 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from statistics import fmean
 
-from doorstate.training.comparison import Run
+from doorstate.training.comparison import RunSpec
 from doorstate.training.recipes import Recipe, Resolution, resolution_of_epoch
 
 _Known = Mapping[Resolution, Sequence[float]]
 
 
-def eta_seconds(runs: Sequence[Run], recipes: Mapping[str, Recipe], num_points: int) -> float | None:
+def eta_seconds(runs: Sequence[RunSpec], recipes: Mapping[str, Recipe], num_points: int) -> float | None:
     """Seconds that one job after the other would need for what is left; None before the first epoch is done.
 
     Args:
@@ -25,16 +25,16 @@ def eta_seconds(runs: Sequence[Run], recipes: Mapping[str, Recipe], num_points: 
     for run in runs:
         for line in run.folder.read_log():
             resolution = Resolution(int(line["points"]), float(line.get("centres", 1)))
-            known[run.network][resolution].append(float(line["seconds"]))
+            known[run.method][resolution].append(float(line["seconds"]))
     if not known:
         return None
     left = 0.0
     for run in runs:
-        if run.folder.finished or run.network not in recipes:  # rules take seconds
+        if run.folder.finished or run.method not in recipes:  # rules take seconds
             continue
-        recipe, done = recipes[run.network], run.folder.read_position()
+        recipe, done = recipes[run.method], run.folder.read_position()
         # Another network's epochs are a better guess than none.
-        own = known[run.network] if run.network in known else next(iter(known.values()))
+        own = known[run.method] if run.method in known else next(iter(known.values()))
         for epoch in range(int(done), recipe.epochs):
             share = 1 - (done - epoch) if epoch < done else 1.0
             left += share * _epoch_seconds(own, resolution_of_epoch(recipe, epoch, num_points))

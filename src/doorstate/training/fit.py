@@ -256,7 +256,7 @@ class _Trainer:
         load_into(self.network, self.run.weights)
         self.network.to(self.fabric.device)
         metrics: dict[str, Any] = {
-            "network": self.config.network,
+            "method": self.config.network,
             "fold": self.config.fold,
             "best_epoch": self.best_epoch,
             "seconds": sum(line["seconds"] for line in self.log),
@@ -272,7 +272,7 @@ class _Trainer:
                 write_predictions(path, doors, found.labels[found.doors], found.probabilities[found.doors])
                 metrics |= {f"{role}_macro_f1": found.macro_f1, f"{role}_accuracy": found.accuracy}
                 if role == "test" and found.answers:
-                    write_answers(self.run.answers, samples, in_metres(found.answers, loader.centroids))
+                    write_answers(self.run.head_outputs, samples, in_metres(found.answers, loader.centroids))
                 if role == "test" and found.part_counts is not None:
                     metrics["test_part_counts"] = found.part_counts.tolist()
         return metrics

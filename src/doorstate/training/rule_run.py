@@ -72,7 +72,7 @@ def answer(
         rows.append(_row(sample, dataset.rows[index]["state"], given))
         if rows[-1]["state"] != rows[-1]["predicted"]:
             shapes = [[shape.name, np.round(shape.points_m, 3).tolist()] for shape in given.detections]
-            found.append(json.dumps({"sample_id": sample, "found": shapes}))
+            found.append(json.dumps({"sample_id": sample, "detections": shapes}))
         if time.perf_counter() - told > _TELL_EVERY_S:
             told = time.perf_counter()
             run.write_position((done + 1) / len(tested))
@@ -80,7 +80,7 @@ def answer(
     write_text(run.detections, "".join(line + "\n" for line in found))
     true, said = [row["state"] for row in rows], [row["predicted"] for row in rows]
     metrics = {
-        "network": config.rule,
+        "method": config.rule,
         "fold": config.fold,
         "seconds": time.perf_counter() - started,
         "test_samples": len(tested),

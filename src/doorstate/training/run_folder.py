@@ -36,8 +36,8 @@ class RunFolder:
         self.weights = path / "weights.safetensors"
         self.predictions = path / "predictions.csv"
         self.validation = path / "validation.csv"  # the same of the samples that the epoch was chosen on
-        self.answers = path / "answers.csv"  # of further heads, to all test samples
-        self.detections = path / "detections.jsonl"  # what a rule found in samples that it did not get right
+        self.head_outputs = path / "head_outputs.csv"  # of further heads, for all test samples
+        self.detections = path / "detections.jsonl"  # of a rule, for the test samples that it got wrong
         self.metrics = path / "metrics.json"
 
     @property
