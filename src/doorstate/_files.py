@@ -4,11 +4,14 @@
 from __future__ import annotations
 
 import csv
+import gzip
 import io
 import os
+import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TextIO
 
 from doorstate.errors import DatasetError, OutputError
 
@@ -65,8 +68,14 @@ def write_text(target: Path, text: str) -> None:
         temporary.write_text(text, encoding="utf-8")
 
 
+def write_compressed_text(target: Path, text: str) -> None:
+    """Write `text` as UTF-8, compressed with gzip; the same text gives the same bytes."""
+    with atomic_path(target) as temporary:
+        temporary.write_bytes(gzip.compress(text.encode("utf-8"), mtime=0))
+
+
 def write_csv(path: Path, rows: Sequence[Mapping[str, str]]) -> None:
-    """Write rows under the union of their columns, in order of appearance."""
+    """Write rows under the union of their columns, in order of appearance; compressed if the name ends in `.gz`."""
     names = list(dict.fromkeys(name for row in rows for name in row))
     text = io.StringIO(newline="")
     # Before Python 3.13 the writer leaves a lone carriage return unquoted, which reads back as the end of a line.
@@ -80,22 +89,29 @@ def write_csv(path: Path, rows: Sequence[Mapping[str, str]]) -> None:
     )
     writer.writeheader()
     writer.writerows(rows)
-    write_text(path, text.getvalue())
+    write = write_compressed_text if path.suffix == ".gz" else write_text
+    write(path, text.getvalue())
 
 
 def read_csv(path: Path) -> list[dict[str, str]]:
-    """Read a CSV with a header line.
+    """Read a CSV with a header line; decompress it if the name ends in `.gz`.
 
     Raises:
         DatasetError: the file is missing, is not text, or a line has another number of columns than the header.
     """
     try:
-        with path.open(encoding="utf-8-sig", newline="") as stream:
+        with _open_text(path) as stream:
             reader = csv.DictReader(stream, strict=True)
             rows = list(reader)
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+    except (OSError, EOFError, zlib.error, UnicodeDecodeError, csv.Error) as error:
         raise DatasetError(f"{path}: cannot be read as CSV ({error})") from error
     for number, row in enumerate(rows, start=2):
         if None in row or None in row.values():
             raise DatasetError(f"{path}: line {number} has another number of columns than the header")
     return rows
+
+
+def _open_text(path: Path) -> TextIO:
+    if path.suffix == ".gz":
+        return gzip.open(path, "rt", encoding="utf-8-sig", newline="")
+    return path.open(encoding="utf-8-sig", newline="")

@@ -17,7 +17,7 @@ from doorstate.dataset.store import CLOUDS, MANIFEST, PARTS, DatasetDescription,
 from doorstate.dataset.strata import distance_band, region
 from doorstate.simulation.generate import PRESETS, draw_pose, pose_indices
 from doorstate.simulation.manifest import flatten
-from doorstate.types import STATES, Part
+from doorstate.types import NO_DOOR, STATES, Part
 
 POSES = 40
 POINTS = 128
@@ -62,6 +62,14 @@ def imported(tmp_path_factory: pytest.TempPathFactory) -> PreparedDataset:
     return _write_dataset(tmp_path_factory.mktemp("imported") / "data", rows, "imported")
 
 
+@pytest.fixture(scope="session")
+def with_empty_scenes(tmp_path_factory: pytest.TempPathFactory) -> PreparedDataset:
+    """Sixty clouds of doors, and twenty without one."""
+    states = (*STATES, NO_DOOR)
+    rows = [{"sample_id": f"{state}/{n}", "state": state} for n in range(20) for state in states]
+    return _write_dataset(tmp_path_factory.mktemp("empty") / "data", rows, "imported")
+
+
 @pytest.fixture
 def make_comparison(tmp_path: Path) -> MakeComparison:
     """Write a comparison folder: every answer right, but for those in `wrong[network][sample_id]`."""
@@ -90,7 +98,7 @@ def make_comparison(tmp_path: Path) -> MakeComparison:
         (folder / "comparison.json").write_text(json.dumps(document))
         states = {row["sample_id"]: row["state"] for row in dataset.rows}
         for fold, roles in enumerate(read_splits(folder / "splits.csv")):
-            tested = [sample_id for sample_id, role in roles.items() if role == "test"]
+            tested = [name for name, role in roles.items() if role == "test" and states[name] != NO_DOOR]
             for network in networks:
                 if (network, fold) not in missing:
                     answers = {sample_id: states[sample_id] for sample_id in tested}

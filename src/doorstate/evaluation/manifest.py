@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Manifest of a data set as a pandas frame: numbers are numbers, and an empty field is missing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import pandas as pd
+
+from doorstate._files import read_csv
+from doorstate.dataset.store import MANIFEST
+from doorstate.errors import DatasetError, RunError
+
+_UNITS = ("_m", "_deg", "_px", "_share")
+"""Endings of the names of columns that hold numbers."""
+
+_SAME = {"hinge": "door.hinge", "opening_width_m": "door.opening_width_m"}
+"""Columns that data sets of one door keep among the settings of that door."""
+
+
+def manifest_path(folder: Path) -> Path:
+    """Return the manifest in a data set folder, plain or compressed.
+
+    Raises:
+        RunError: there is none.
+    """
+    for path in (folder / MANIFEST, folder / f"{MANIFEST}.gz"):
+        if path.is_file():
+            return path
+    raise RunError(f"no {MANIFEST} in this folder", path=folder)
+
+
+def read_manifest(folder: Path) -> pd.DataFrame:
+    """Read the manifest of a data set folder as `manifest_frame` returns it.
+
+    Raises:
+        DatasetError: the file is damaged.
+        RunError: there is none.
+    """
+    path = manifest_path(folder)
+    try:
+        return manifest_frame(read_csv(path))
+    except ValueError as error:
+        raise DatasetError(str(error), path=path) from error
+
+
+def manifest_frame(rows: Sequence[Mapping[str, str]]) -> pd.DataFrame:
+    """Return manifest rows as a frame in the same order, indexed by `sample_id`.
+
+    Columns whose names end in a unit (`_m`, `_deg`, `_px`, `_share`) are float64 with NaN for an empty field.
+
+    Raises:
+        DatasetError: a column that every manifest has is missing.
+        ValueError: a field of such a column is not a number.
+    """
+    frame = pd.DataFrame(list(rows), dtype="str")
+    for column in ("sample_id", "state"):
+        if column not in frame:
+            raise DatasetError("column is missing", field=column)
+    for column, own in _SAME.items():
+        if own in frame and column not in frame:
+            frame[column] = frame[own]
+    for column in frame.columns.difference(["sample_id"]):
+        frame[column] = frame[column].where(frame[column] != "")
+        if column.endswith(_UNITS):
+            frame[column] = frame[column].map(float, na_action="ignore").astype("float64")
+    return frame.set_index("sample_id", drop=False)

@@ -1,0 +1,190 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Load the results of a comparison from its folder or from its published form, check them, and join several."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from pydantic import ValidationError
+
+from doorstate.dataset.splits import Role, read_splits
+from doorstate.errors import RunError, first_validation_error
+from doorstate.evaluation import comparison_folder, published
+from doorstate.evaluation.checks import check_predictions
+from doorstate.evaluation.comparison import KEY_COLUMNS, RULE_COLUMNS, TEXT_COLUMNS, ComparisonConfig, Results
+from doorstate.evaluation.manifest import manifest_path, read_manifest
+from doorstate.evaluation.published import save_results
+from doorstate.rules.base import Detection
+from doorstate.training.run_folder import read_json, run_of
+
+__all__ = ["Results", "is_comparison", "join_results", "load_results", "save_results"]
+
+_DATASETS = "datasets"  # beside published comparisons: manifests of their data sets
+_DEPTH = 3  # folders between a published comparison and `datasets`, of a study's parts the most
+
+
+def is_comparison(folder: Path) -> bool:
+    """Tell whether a folder holds a comparison, as training leaves it or published."""
+    return (folder / comparison_folder.COMPARISON).is_file() or _is_published(folder)
+
+
+def load_results(folder: Path, dataset: Path | None = None, folds: int | None = None) -> Results:
+    """Load and check the results of a comparison; runs without predictions are listed in `Results.missing`.
+
+    Args:
+        folder: comparison folder with `runs/<method>/fold<k>/`, or the published form.
+        dataset: data set folder, if it is not where the comparison says.
+        folds: number of first folds to read; all if not given.
+
+    Raises:
+        RunError: no run is finished, a file is missing or damaged, a method tested a sample twice, or a state or a
+            test set differs from the manifest of the data set or from the splits.
+    """
+    is_published = _is_published(folder)
+    layout = published if is_published else comparison_folder
+    config = _read_config(folder / (published.EXPERIMENT if is_published else comparison_folder.COMPARISON))
+    config = config.model_copy(update={"folds": min(config.folds, folds or config.folds)})
+    splits = read_splits(folder / layout.SPLITS)
+    if len(splits) < config.folds:
+        raise RunError(f"{len(splits)} folds, not {config.folds}", path=folder / layout.SPLITS)
+    dataset_folder = dataset or _find_dataset(folder, config.dataset, is_published)
+    load = _load_published if is_published else _load_runs
+    return load(folder, config, dataset_folder, tuple(splits))
+
+
+def join_results(parts: Sequence[Results]) -> Results:
+    """Put the methods of comparisons on the same samples side by side, in the order given.
+
+    Folds that one of them does not have are left out.
+
+    Raises:
+        RunError: they differ in protocol, points or splits, or a method is in two of them.
+    """
+    folds = min(part.config.folds for part in parts)
+    first = parts[0]
+    for part in parts[1:]:
+        for name in ("protocol", "num_points"):
+            if getattr(part.config, name) != getattr(first.config, name):
+                raise RunError(
+                    f"{part.config.name} has another {name} than {first.config.name}",
+                    field=name,
+                    hint="join comparisons of one kind only",
+                )
+        if part.splits[:folds] != first.splits[:folds]:
+            raise RunError(
+                f"{part.config.name} has other splits than {first.config.name}",
+                hint="join comparisons of one kind only",
+            )
+    counts = Counter(method for part in parts for method in part.config.methods)
+    if repeated := [method for method, count in counts.items() if count > 1]:
+        raise RunError(f"{repeated[0]} is in two of these comparisons", hint="leave one out")
+    config = first.config.model_copy(
+        update={
+            "name": " + ".join(part.config.name for part in parts),
+            "folds": folds,
+            "networks": tuple(name for part in parts for name in part.config.networks),
+            "rules": tuple(name for part in parts for name in part.config.rules),
+            "recipe": {key: value for part in parts for key, value in part.config.recipe.items()},
+            "runs": {key: value for part in parts for key, value in part.config.runs.items()},
+        }
+    )
+    predictions = pd.concat([part.predictions for part in parts], ignore_index=True)
+    return Results(
+        config,
+        first.dataset_folder,
+        first.manifest,
+        first.splits,
+        _ordered(predictions[predictions["fold"] < folds], config),
+        tuple(run for part in parts for run in part.runs if run.fold < folds),
+        {method: shapes for part in parts for method, shapes in part.detections.items()},
+    )
+
+
+def _is_published(folder: Path) -> bool:
+    return (folder / published.EXPERIMENT).is_file()
+
+
+def _read_config(path: Path) -> ComparisonConfig:
+    try:
+        return ComparisonConfig.model_validate(read_json(path))
+    except ValidationError as error:
+        raise RunError(first_validation_error(error), path=path, hint="write the comparison again") from error
+
+
+def _find_dataset(folder: Path, dataset: str, is_published: bool) -> Path:
+    ancestors = folder.absolute().parents[:_DEPTH] if is_published else ()
+    beside = [ancestor / _DATASETS / Path(dataset).name for ancestor in ancestors]
+    for candidate in (*beside, Path(dataset), folder / dataset):
+        try:
+            return manifest_path(candidate).parent
+        except RunError:
+            continue
+    raise RunError(f"no manifest in its data set {dataset}", path=folder, field="dataset")
+
+
+def _load_runs(
+    folder: Path, config: ComparisonConfig, dataset_folder: Path, splits: tuple[Mapping[str, Role], ...]
+) -> Results:
+    contents = comparison_folder.read_runs(folder, config.methods, config.folds)
+    if not contents:
+        raise RunError("no run has predictions yet", path=folder, hint="train at least one network first")
+    settings: dict[str, Mapping[str, Any]] = {}
+    detections: dict[str, dict[str, tuple[Detection, ...]]] = {}
+    for each in contents:
+        settings.setdefault(each.record.method, each.config)
+        detections.setdefault(each.record.method, {}).update(each.detections)
+    predictions = pd.concat([each.predictions for each in contents], ignore_index=True)
+    manifest = read_manifest(dataset_folder)
+    # Head outputs alone name samples without a door, and no states.
+    predictions["state"] = predictions["state"].fillna(predictions["sample_id"].map(manifest["state"]))
+    results = Results(
+        config.model_copy(update={"runs": settings}),
+        dataset_folder,
+        manifest,
+        splits,
+        _ordered(predictions, config),
+        tuple(each.record for each in contents),
+        detections,
+    )
+    check_predictions(results, lambda method, fold: run_of(folder, method, fold).predictions)
+    return results
+
+
+def _load_published(
+    folder: Path, config: ComparisonConfig, dataset_folder: Path, splits: tuple[Mapping[str, Role], ...]
+) -> Results:
+    path = folder / published.PREDICTIONS
+    predictions = published.read_predictions(path)
+    runs = published.read_records(folder / published.METRICS)
+    results = Results(
+        config,
+        dataset_folder,
+        read_manifest(dataset_folder),
+        splits,
+        _ordered(predictions[predictions["fold"] < config.folds], config),
+        tuple(run for run in runs if run.fold < config.folds),
+    )
+    check_predictions(results, lambda method, fold: path)
+    return results
+
+
+def _ordered(predictions: pd.DataFrame, config: ComparisonConfig) -> pd.DataFrame:
+    """Sort rows by method, fold and role, samples as they were, and put the columns that all tables have first."""
+    rank = pd.DataFrame(
+        {
+            "method": predictions["method"].map({name: rank for rank, name in enumerate(config.methods)}),
+            "fold": predictions["fold"],
+            "role": predictions["role"],
+        }
+    )
+    rows = predictions.loc[rank.sort_values(["method", "fold", "role"], kind="stable").index]
+    first = (*KEY_COLUMNS, *RULE_COLUMNS)
+    columns = [*first, *(name for name in predictions if name not in first)]
+    text = {name: "str" for name in columns if name in TEXT_COLUMNS}
+    return (
+        rows.reindex(columns=columns).astype({**text, "opening_angle_deg": "float64"}).reset_index(drop=True)
+    )

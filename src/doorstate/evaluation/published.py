@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Published form of a comparison: four files, of which predictions and splits are compressed tables.
+
+`experiment.json` holds the resolved configuration and the settings of every method, `metrics.json` the metrics,
+environment and epoch log of every run. The same results give the same bytes.
+"""
+
+from __future__ import annotations
+
+import json
+import zlib
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from doorstate._files import write_compressed_text, write_text
+from doorstate.dataset.splits import write_splits
+from doorstate.errors import RunError
+from doorstate.evaluation.comparison import KEY_COLUMNS, TEXT_COLUMNS, Results, RunRecord
+from doorstate.training.run_folder import read_json
+
+EXPERIMENT, METRICS = "experiment.json", "metrics.json"
+SPLITS, PREDICTIONS = "splits.csv.gz", "predictions.csv.gz"
+
+
+def save_results(results: Results, folder: Path) -> None:
+    """Write results in their published form.
+
+    Args:
+        results: of one comparison.
+        folder: made if absent.
+    """
+    document = results.config.model_dump(mode="json")
+    write_text(folder / EXPERIMENT, json.dumps(document, indent=1) + "\n")
+    runs = ",\n".join(json.dumps(_encode_run(run)) for run in results.runs)
+    write_text(folder / METRICS, f'{{"runs": [\n{runs}\n]}}\n')
+    write_splits(folder / SPLITS, [dict(roles) for roles in results.splits])
+    # 15 digits are more than any of these numbers has, and read back as the same float64.
+    table = results.predictions.to_csv(index=False, lineterminator="\n", float_format="%.15g")
+    write_compressed_text(folder / PREDICTIONS, table)
+
+
+def read_predictions(path: Path) -> pd.DataFrame:
+    """Read a published table of predictions.
+
+    Raises:
+        RunError: the file is missing or damaged.
+    """
+    try:
+        frame = pd.read_csv(
+            path,
+            dtype={**dict.fromkeys(TEXT_COLUMNS, "str"), "fold": "int64"},
+            keep_default_na=False,
+            na_values=[""],
+            index_col=False,
+            compression="gzip",
+        )
+        numeric = [name for name in frame if name not in (*TEXT_COLUMNS, "fold")]
+        frame = frame.astype(dict.fromkeys(numeric, "float64"))
+    except (OSError, EOFError, zlib.error, ValueError) as error:
+        raise RunError(f"cannot be read ({error})", path=path) from error
+    for name in KEY_COLUMNS:
+        if name not in frame:
+            raise RunError("column is missing", path=path, field=name)
+    return frame
+
+
+def read_records(path: Path) -> list[RunRecord]:
+    """Read the metrics, environment and epoch log of every run.
+
+    Raises:
+        RunError: the file is missing or damaged.
+    """
+    try:
+        return [
+            RunRecord(
+                run["method"],
+                int(run["fold"]),
+                run["metrics"],
+                run["environment"],
+                pd.DataFrame(run["log"], dtype="float64"),
+            )
+            for run in read_json(path)["runs"]
+        ]
+    except (KeyError, TypeError, ValueError) as error:
+        raise RunError(f"holds no list of runs ({error!r})", path=path) from error
+
+
+def _encode_run(run: RunRecord) -> dict[str, Any]:
+    log = {name: [None if value != value else value for value in run.log[name].tolist()] for name in run.log}
+    return {
+        "method": run.method,
+        "fold": run.fold,
+        "metrics": run.metrics,
+        "environment": run.environment,
+        "log": log,
+    }
