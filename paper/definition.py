@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Files of `paper/experiments/`: the command of an experiment, its data sets and the weights it starts from."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from .paths import EXPERIMENTS
+
+
+@dataclass(frozen=True)
+class Definition:
+    """One file of `paper/experiments/`."""
+
+    name: str
+    content: dict[str, Any]
+
+    @property
+    def command(self) -> Literal["compare", "resolution", "transfer"]:
+        """Command of doorstate: `compare` trains; `transfer` and `resolution` test trained weights."""
+        if "tested" in self.content:
+            return "transfer"
+        return "resolution" if "points" in self.content else "compare"
+
+    @property
+    def is_study(self) -> bool:
+        """True for an experiment that consists of several comparisons."""
+        return self.command != "compare"
+
+    @property
+    def starts_from(self) -> list[str]:
+        """Names of the experiments whose weights are needed."""
+        folders = self.content.get("trained", {}).values() or filter(None, [self.content.get("start_from")])
+        return [Path(folder).name for folder in folders]
+
+    @property
+    def datasets(self) -> list[Path]:
+        """Prepared data sets that are needed, relative to the repository."""
+        tested = self.content.get("tested", {}).values() or [self.content["dataset"]]
+        return [Path(folder) for folder in (*tested, *self.content.get("extra_train_datasets", ()))]
+
+
+def read_definition(name: str, folder: Path | None = None) -> Definition:
+    """Read the definition of an experiment by name.
+
+    Args:
+        name: of the experiment.
+        folder: with the files; `paper/experiments` if not given.
+
+    Raises:
+        FileNotFoundError: there is no such file.
+    """
+    path = (folder or EXPERIMENTS) / f"{name}.toml"
+    return Definition(name, tomllib.loads(path.read_text(encoding="utf-8")))
+
+
+def read_definitions() -> Iterator[Definition]:
+    """Read all definitions, by name."""
+    return (read_definition(path.stem) for path in sorted(EXPERIMENTS.glob("*.toml")))
