@@ -99,7 +99,7 @@ def test_head_outputs_add_columns_and_samples_without_a_door(
     with_empty_scenes: PreparedDataset, make_comparison: MakeComparison
 ) -> None:
     folder = make_comparison(with_empty_scenes)
-    path = _predictions(folder, "dgcnn").with_name("answers.csv")
+    path = _predictions(folder, "dgcnn").with_name("head_outputs.csv")
     tested = [name for name, role in read_splits(folder / "splits.csv")[0].items() if role == "test"]
     path.write_text("".join(["sample_id,p_door\n", *(f"{name},0.25\n" for name in tested)]))
     results = load_results(folder)

@@ -203,6 +203,18 @@ def is_prepared(folder: Path) -> bool:
     return (folder / DESCRIPTION).is_file()
 
 
+def manifest_path(folder: Path) -> Path:
+    """Return the manifest in a data set folder, plain or compressed.
+
+    Raises:
+        DatasetError: there is none.
+    """
+    for path in (folder / MANIFEST, folder / f"{MANIFEST}.gz"):
+        if path.is_file():
+            return path
+    raise DatasetError(f"no {MANIFEST} in this folder", path=folder)
+
+
 def open_dataset(folder: Path) -> PreparedDataset:
     """Open a prepared data set.
 
@@ -222,7 +234,7 @@ def open_dataset(folder: Path) -> PreparedDataset:
         raise DatasetError(f"{path}: {first_validation_error(error)}") from error
     except (OSError, ValueError, EOFError) as error:
         raise DatasetError(f"{folder}: damaged ({error}); delete it and prepare it again") from error
-    rows = read_csv(folder / MANIFEST)
+    rows = read_csv(manifest_path(folder))
     shape = (description.samples, description.num_points, 3)
     if len(rows) != description.samples or (
         clouds is not None and (clouds.shape != shape or clouds.dtype != np.float32)

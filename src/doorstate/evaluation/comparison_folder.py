@@ -40,7 +40,7 @@ def read_runs(folder: Path, methods: Iterable[str], folds: int) -> list[RunConte
 
 
 def _read_run(run: RunFolder, method: str, fold: int) -> RunContents:
-    parts = [_with_head_outputs(_read_predictions(run.predictions), run.answers).assign(role="test")]
+    parts = [_with_head_outputs(_read_predictions(run.predictions), run.head_outputs).assign(role="test")]
     if run.validation.exists():
         parts.append(_read_predictions(run.validation).assign(role="val"))
     config = read_json(run.config) if run.config.exists() else {}

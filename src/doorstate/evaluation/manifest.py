@@ -9,8 +9,8 @@ from pathlib import Path
 import pandas as pd
 
 from doorstate._files import read_csv
-from doorstate.dataset.store import MANIFEST
-from doorstate.errors import DatasetError, RunError
+from doorstate.dataset.store import manifest_path
+from doorstate.errors import DatasetError
 
 _UNITS = ("_m", "_deg", "_px", "_share")
 """Endings of the names of columns that hold numbers."""
@@ -19,24 +19,11 @@ _SAME = {"hinge": "door.hinge", "opening_width_m": "door.opening_width_m"}
 """Columns that data sets of one door keep among the settings of that door."""
 
 
-def manifest_path(folder: Path) -> Path:
-    """Return the manifest in a data set folder, plain or compressed.
-
-    Raises:
-        RunError: there is none.
-    """
-    for path in (folder / MANIFEST, folder / f"{MANIFEST}.gz"):
-        if path.is_file():
-            return path
-    raise RunError(f"no {MANIFEST} in this folder", path=folder)
-
-
 def read_manifest(folder: Path) -> pd.DataFrame:
     """Read the manifest of a data set folder as `manifest_frame` returns it.
 
     Raises:
-        DatasetError: the file is damaged.
-        RunError: there is none.
+        DatasetError: the file is missing or damaged.
     """
     path = manifest_path(folder)
     try:

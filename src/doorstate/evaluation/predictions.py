@@ -12,11 +12,12 @@ import pandas as pd
 from pydantic import ValidationError
 
 from doorstate.dataset.splits import Role, read_splits
-from doorstate.errors import RunError, first_validation_error
+from doorstate.dataset.store import manifest_path
+from doorstate.errors import DatasetError, RunError, first_validation_error
 from doorstate.evaluation import comparison_folder, published
 from doorstate.evaluation.checks import check_predictions
 from doorstate.evaluation.comparison import KEY_COLUMNS, RULE_COLUMNS, TEXT_COLUMNS, ComparisonConfig, Results
-from doorstate.evaluation.manifest import manifest_path, read_manifest
+from doorstate.evaluation.manifest import read_manifest
 from doorstate.evaluation.published import save_results
 from doorstate.rules.base import Detection
 from doorstate.training.run_folder import read_json, run_of
@@ -121,7 +122,7 @@ def _find_dataset(folder: Path, dataset: str, is_published: bool) -> Path:
     for candidate in (*beside, Path(dataset), folder / dataset):
         try:
             return manifest_path(candidate).parent
-        except RunError:
+        except DatasetError:
             continue
     raise RunError(f"no manifest in its data set {dataset}", path=folder, field="dataset")
 
