@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Commands of `doorstate` as subprocesses in the repository, printed as anybody can type them."""
+"""`doorstate` commands that other tools run, shown as anybody can type them."""
 
 from __future__ import annotations
 
@@ -10,20 +10,19 @@ from pathlib import Path
 
 from doorstate.dataset.store import is_prepared
 
-from .paths import REPOSITORY
+REPOSITORY = Path(__file__).resolve().parents[1]
 
 
-def doorstate(arguments: str, prepared: Path | None = None) -> None:
-    """Print and run one command; exit with its code if it fails.
+def doorstate(arguments: str, makes: Path | None = None) -> None:
+    """Print and run one command in the repository; its error ends the tool.
 
     Args:
         arguments: after `doorstate`.
-        prepared: data set that the command makes. If it exists afterwards, exit code 1 means that some clouds were
-            left out, which is no failure.
+        makes: a prepared data set; where it is there in the end, exit code 1 says that some clouds were left out.
     """
     print(f"\n$ doorstate {arguments}", flush=True)
     program = Path(sys.executable).with_name("doorstate")
     finished = subprocess.run([program, *shlex.split(arguments)], cwd=REPOSITORY, check=False)
-    is_partial = finished.returncode == 1 and prepared is not None and is_prepared(prepared)
-    if finished.returncode and not is_partial:
+    left_some_out = finished.returncode == 1 and makes is not None and is_prepared(makes)
+    if finished.returncode and not left_some_out:
         sys.exit(finished.returncode)
