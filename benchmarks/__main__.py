@@ -406,8 +406,7 @@ def _finish(out: Path, name: str, rows: list[dict[str, Any]], table: Table, **op
 
 
 def _tell(table: Table, path: Path, remarks: Sequence[str] = ()) -> None:
-    from doorstate.cli.console import out as stdout
-    from doorstate.cli.console import print_table
+    from doorstate.cli.console import print_table, stdout
 
     print_table(table.title, table.columns, table.rows)
     for remark in remarks:

@@ -44,8 +44,8 @@ from doorstate.io.readers import (
     read_cloud,
 )
 from doorstate.io.size_limits import MAX_POINTS
-from doorstate.serving.service import create_app
-from doorstate.serving.workload import Limits
+from doorstate.serving.app import create_app
+from doorstate.serving.work_queue import Limits
 from doorstate.types import Points
 
 LIMIT_S = 1.0  # of processor time for one input

@@ -14,8 +14,8 @@ import argparse
 from pathlib import Path
 
 from doorstate import Predictor, ReadOptions, read_cloud
+from doorstate.cli.compare import compare_with_display
 from doorstate.cli.console import progress_bar
-from doorstate.cli.training import compare_live
 from doorstate.clouds.preparation import CloudSpec
 from doorstate.dataset.prepare import Preparation, prepare_dataset
 from doorstate.io.readers import UNITS_M, find_clouds
@@ -57,7 +57,7 @@ def main() -> None:
             "recipe_changes": {"epochs": asked.epochs},
         },
     )
-    (metrics,) = compare_live(experiment, asked.out / "comparison", jobs=1)
+    (metrics,) = compare_with_display(experiment, asked.out / "comparison", jobs=1)
     print(f"macro-F1 {metrics['test_macro_f1']:.3f} on {metrics['test_samples']} clouds not trained on")
 
     weights = run_of(asked.out / "comparison", asked.network, 0).weights

@@ -73,7 +73,7 @@ def again(network: str, fold: int, name: str = "paper") -> str | None:
     The spread is twice the sample standard deviation over the published folds, around the fold's own figure, and not
     less than two samples: another machine rounds differently and so trains other weights.
     """
-    from doorstate.cli.console import live_runs
+    from doorstate.cli.run_display import live_runs
     from doorstate.evaluation.metrics import mean_and_deviation
     from doorstate.training.comparison import RunSpec, load_experiment, train_fold
     from doorstate.training.run_folder import RunFolder, run_of

@@ -23,26 +23,26 @@ _LOOK_EVERY_S = 0.2
 
 
 class Shard(NamedTuple):
-    """One of so many equal shares of a job's pieces; `number` counts from 1."""
+    """One of `shards` equal parts of a job; `number` counts from 1."""
 
     number: int
     shards: int
 
     @classmethod
     def parse(cls, text: str) -> Self:
-        """Read `2/8`.
+        """Parse text such as `2/8`.
 
         Raises:
-            ConfigError: it is not of that form, or there is no such share.
+            ConfigError: the text has another form, or there is no such shard.
         """
         match = re.fullmatch(r"([0-9]{1,6})/([0-9]{1,6})", text)
         shard = cls(*(int(digits) for digits in match.groups())) if match else cls(0, 0)
         if not 1 <= shard.number <= shard.shards:
-            raise ConfigError(f"--shard {text}: give the share and how many there are, such as 2/8")
+            raise ConfigError(f"{text!r} is not a shard", field="shard", expected="number/count, such as 2/8")
         return shard
 
     def of(self, pieces: Sequence[Piece]) -> Sequence[Piece]:
-        """Every so-many-th piece, so that all shares take about as long."""
+        """Return every `shards`-th piece, so that all shards take about as long."""
         return pieces[self.number - 1 :: self.shards]
 
 
@@ -98,7 +98,8 @@ def run_pieces(
             pool.shutdown(cancel_futures=True)
             if isinstance(error, BrokenProcessPool):
                 raise RunError(
-                    "a worker was killed, perhaps for memory; go on with fewer at a time (--workers, --jobs)"
+                    "a worker process was killed, perhaps for lack of memory",
+                    hint="run again with fewer processes: finished pieces are kept",
                 ) from error
             raise
 

@@ -24,7 +24,7 @@ from doorstate.networks.packaged import packaged_networks
 from doorstate.rules import list_rules
 
 Run = Callable[..., tuple[int, str, str]]
-REAL = Path(__file__).resolve().parents[1].parent / "shared" / "real"
+REAL = Path(__file__).resolve().parents[2].parent / "shared" / "real"
 COMMANDS = (
     "simulate",
     "prepare",

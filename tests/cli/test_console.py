@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from doorstate.cli import console
+from doorstate.cli import console, run_display
 from doorstate.training.comparison import RunSpec
 from doorstate.training.recipes import Recipe, Stage
 from doorstate.training.run_folder import RunFolder
@@ -36,7 +36,7 @@ def finished(folder: Path) -> RunFolder:
 
 def shown(runs: list[RunSpec], jobs: int) -> str:
     screen = Console(file=io.StringIO(), width=100)
-    screen.print(console._RunWatch(runs, RECIPES, 512, jobs).table())
+    screen.print(run_display.RunDisplay(runs, RECIPES, 512, jobs).table())
     assert isinstance(screen.file, io.StringIO)
     return screen.file.getvalue()
 
@@ -64,10 +64,10 @@ def test_without_a_finished_epoch_nothing_is_promised(tmp_path: Path) -> None:
 def test_where_nobody_looks_finished_runs_are_counted(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    with console.live_runs([RunSpec("dgcnn", 0, RunFolder(tmp_path))], RECIPES, 512, 1) as progress:
+    with run_display.live_runs([RunSpec("dgcnn", 0, RunFolder(tmp_path))], RECIPES, 512, 1) as progress:
         progress(1, 4)
     assert capsys.readouterr().err == "1 of 4 runs finished\n"
-    with console.live_runs([RunSpec("dgcnn", 0, begun(tmp_path))], RECIPES, 512, 1) as progress:
+    with run_display.live_runs([RunSpec("dgcnn", 0, begun(tmp_path))], RECIPES, 512, 1) as progress:
         progress(1, 4)
     assert capsys.readouterr().err == "1 of 4 runs finished, about 6 min left\n"
 
@@ -75,8 +75,8 @@ def test_where_nobody_looks_finished_runs_are_counted(
 def test_a_log_hears_of_long_runs_before_they_end(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(console, "_LINE_EVERY_S", 0.01)
-    with console.live_runs([RunSpec("dgcnn", 0, begun(tmp_path))], RECIPES, 512, 1):
+    monkeypatch.setattr(run_display, "_LINE_PERIOD_S", 0.01)
+    with run_display.live_runs([RunSpec("dgcnn", 0, begun(tmp_path))], RECIPES, 512, 1):
         time.sleep(0.1)
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) > 1
@@ -97,7 +97,7 @@ def test_bars_print_nothing_where_nobody_looks(capsys: pytest.CaptureFixture[str
 
 def test_bars_are_drawn_on_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
     screen = Console(file=io.StringIO(), force_terminal=True, width=80)
-    monkeypatch.setattr(console, "err", screen)
+    monkeypatch.setattr(console, "stderr", screen)
     with console.progress_bar("Working") as progress:
         progress(3, 7)
     assert isinstance(screen.file, io.StringIO)

@@ -16,7 +16,7 @@ from doorstate._files import write_csv
 from doorstate.simulation.frames import replay
 from doorstate.simulation.generate import PRESETS, draw_pose
 from doorstate.types import ABSTAINED
-from tests.headless_chromium import Browser
+from tests.headless_chromium import open_browser_page
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -78,38 +78,36 @@ def test_answers_are_counted_and_written(recordings: Path, report: Path, weights
     )
 
 
-def test_the_page_draws_every_cloud_and_filters(report: Path, tmp_path: Path) -> None:
-    with Browser(tmp_path / "profile") as browser:
-        browser.open((report / "frames.html").as_uri())
-        assert browser.evaluate("document.querySelectorAll('.card').length") == 7
-        assert browser.evaluate("document.querySelectorAll('.card .cloud').length") == 14
-        # The photo and seven depth images.
-        assert browser.evaluate(
-            "[...document.images].every((each) => each.src.startsWith('data:image/jpeg'))"
+def test_page_draws_clouds_and_filters_frames(report: Path) -> None:
+    with open_browser_page() as (page, errors):
+        page.goto((report / "frames.html").as_uri())
+        assert page.locator(".card").count() == 7
+        assert page.locator(".card .cloud").count() == 14
+        sources = page.evaluate("[...document.images].map((image) => image.src.slice(0, 15))")
+        assert sources == ["data:image/jpeg"] * 8  # the photo and seven depth images
+        page.locator(".card .cloud").first.scroll_into_view_if_needed()
+        page.wait_for_function(
+            "document.querySelector('.card canvas').getContext('2d').getImageData(0, 0, 150, 100).data.some((v) => v)"
         )
-        assert browser.evaluate("document.images.length") == 8
-        browser.evaluate("document.querySelector('.card .cloud').scrollIntoView({behavior: 'instant'})")
-        painted = (
-            "[...document.querySelector('.card canvas').getContext('2d').getImageData(0, 0, 150, 100).data]"
-        )
-        browser.wait_until(
-            f"document.querySelector('.card canvas').width > 300 || {painted}.some((v) => v > 0)"
-        )
-        chips = "[...document.querySelectorAll('.chips button')].map((each) => each.textContent)"
-        assert browser.evaluate(chips) == ["all", "pointnet wrong", "plane_state wrong"]
-        browser.evaluate("document.querySelectorAll('.chips button')[2].click()")
-        shown = browser.evaluate(
-            "[...document.querySelectorAll('.card:not([hidden])')].map((e) => e.dataset.file)"
+        chips = page.locator(".chips button")
+        assert chips.evaluate_all("(all) => all.map((chip) => chip.dataset.choice)") == [
+            "",
+            "pointnet",
+            "plane_state",
+        ]
+        chips.nth(2).click()
+        visible = page.locator(".card:not([hidden])").evaluate_all(
+            "(all) => all.map((card) => card.dataset.file)"
         )
         with (report / "predictions.csv").open(encoding="utf-8") as file:
-            said = [row for row in csv.DictReader(file) if row["method"] == "plane_state"]
-        right = {"no_door": ABSTAINED}
-        wrong = {row["file"] for row in said if row["predicted"] != right.get(row["state"], row["state"])}
-        assert set(shown) == wrong
-        browser.evaluate("document.querySelectorAll('.chips button')[0].click()")
-        browser.evaluate("document.querySelector('.card .cloud').click()")
-        browser.wait_until("document.querySelector('.live .main-svg') !== null")
-        assert browser.problems == []
+            rows = [row for row in csv.DictReader(file) if row["method"] == "plane_state"]
+        correct = {"no_door": ABSTAINED}
+        wrong = {row["file"] for row in rows if row["predicted"] != correct.get(row["state"], row["state"])}
+        assert set(visible) == wrong
+        chips.nth(0).click()
+        page.locator(".card .cloud").first.click()
+        page.wait_for_selector(".live .main-svg")
+        assert errors == []
 
 
 def test_folders_of_states_are_enough_and_the_same_files_come_out_twice(

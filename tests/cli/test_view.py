@@ -18,7 +18,7 @@ from urllib.parse import unquote, urlsplit
 import numpy as np
 import pytest
 
-from doorstate.cli import view as viewing
+from doorstate.cli import view_output
 from tests.hand_made_clouds import image_of_a_rough_wall
 
 Run = Callable[..., tuple[int, str, str]]
@@ -96,7 +96,7 @@ def test_a_file_that_cannot_be_shown_is_one_line_and_the_others_are(
 def test_a_large_page_is_said_to_be_large(
     view: Run, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(viewing, "_LARGE_PAGE_BYTES", 1_000_000)
+    monkeypatch.setattr(view_output, "_LARGE_PAGE_BYTES", 1_000_000)
     code, _, err = view(folder, "--out", tmp_path / "page.html")
     assert code == 0
     assert len(err.splitlines()) == 1

@@ -29,15 +29,17 @@ import uvicorn
 from PIL import Image
 
 import doorstate
-from doorstate.cli.serve import KEEP_ALIVE_S, _listen
 from doorstate.inference.predictor import Predictor
 from doorstate.inference.rule_predictor import RulePredictor
 from doorstate.io.pcd import write_pcd
 from doorstate.io.readers import CLOUD_SUFFIXES
 from doorstate.networks import create_network
 from doorstate.networks.weights import WeightsCard, save_weights
-from doorstate.serving.service import Answer, FileQuery, create_app
-from doorstate.serving.workload import Limits
+from doorstate.serving.app import create_app
+from doorstate.serving.models import PredictionResponse
+from doorstate.serving.request import PredictQuery
+from doorstate.serving.server import KEEP_ALIVE_S, listen
+from doorstate.serving.work_queue import Limits
 
 Run = Callable[..., tuple[int, str, str]]
 COMMAND = Path(sys.executable).with_name("doorstate")
@@ -127,7 +129,7 @@ def test_a_refused_cloud_has_a_reason_and_no_state() -> None:
     assert answer["state"] is None
     assert answer["reason"] == "something is before the camera"
     always = {"state", "probabilities", "points", "milliseconds", "reason"}
-    assert set(answer) == always <= set(Answer.model_fields)
+    assert set(answer) == always <= set(PredictionResponse.model_fields)
 
 
 @pytest.mark.parametrize(
@@ -255,7 +257,7 @@ def test_a_rule_answers_too() -> None:
 def test_openapi_tells_all(client: httpx.Client) -> None:
     told = client.get("/openapi.json").raise_for_status().json()
     predict = told["paths"]["/predict"]["post"]
-    assert {parameter["name"] for parameter in predict["parameters"]} == set(FileQuery.model_fields)
+    assert {parameter["name"] for parameter in predict["parameters"]} == set(PredictQuery.model_fields)
     assert "application/octet-stream" in predict["requestBody"]["content"]
     assert set(predict["responses"]) == {"200", "400", "413", "415", "422", "503", "504"}
     schemas = told["components"]["schemas"]
@@ -402,7 +404,7 @@ def test_the_command_listens_answers_and_stops_cleanly(tmp_path: Path) -> None:
 
 
 def test_no_part_of_an_answer_waits_for_the_one_before() -> None:
-    with _listen("127.0.0.1", 0) as listening, socket.create_connection(listening.getsockname()):
+    with listen("127.0.0.1", 0) as listening, socket.create_connection(listening.getsockname()):
         accepted, _ = listening.accept()
         with accepted:
             assert accepted.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)

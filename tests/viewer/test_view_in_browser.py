@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The view does in headless Chromium what its buttons say, and the console stays empty."""
+"""The cloud page in headless Chromium: buttons, keys, drawing, and no errors in the console."""
 
 from __future__ import annotations
 
 import io
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -16,106 +16,116 @@ from doorstate.evaluation.views import PART_COLORS
 from doorstate.inference.predictor import Predictor
 from doorstate.inference.rule_predictor import RulePredictor
 from doorstate.types import Part
-from doorstate.viewer.cloud_page import look, render_view
+from doorstate.viewer.cloud_page import Entry, make_entry, render_cloud_page
 from doorstate.viewer.live_page import LivePage
 from doorstate.viewer.named_clouds import NamedCloud
-from tests.headless_chromium import Browser
+from tests.headless_chromium import open_browser_page
 
-Entry = dict[str, Any]
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
+
+Browser = tuple["Page", list[str]]
+TRACES = "document.querySelector('#plot').data?.map((trace) => trace.name)"
 
 
 @pytest.fixture(scope="module")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    with Browser(tmp_path_factory.mktemp("chromium")) as started:
-        yield started
+def browser() -> Iterator[Browser]:
+    with open_browser_page() as opened:
+        yield opened
 
 
-TEXT = "document.querySelector('{}').textContent"
-DRAWN = "document.querySelector('#plot').data?.map((trace) => trace.name)"
-
-
-def pixels(browser: Browser) -> np.ndarray:
-    """(H, W, 3) of what is seen, once it has stood still for a moment."""
-    last = b""
+def pixels(page: Page) -> np.ndarray:
+    """Return the (H, W, 3) screenshot, once two in a row are equal."""
+    previous = b""
     for _ in range(100):
-        seen = browser.screenshot()
-        if seen == last:
+        current = page.screenshot()
+        if current == previous:
             break
-        last = seen
-    return np.asarray(Image.open(io.BytesIO(last)).convert("RGB")).astype(int)
+        previous = current
+    return np.asarray(Image.open(io.BytesIO(previous)).convert("RGB")).astype(int)
 
 
-def count_of(color: str, picture: np.ndarray) -> int:
-    wanted = [int(color[place : place + 2], 16) for place in (1, 3, 5)]
-    return int((np.abs(picture - wanted).max(axis=2) < 40).sum())
+def count_color(color: str, picture: np.ndarray) -> int:
+    rgb = [int(color[place : place + 2], 16) for place in (1, 3, 5)]
+    return int((np.abs(picture - rgb).max(axis=2) < 40).sum())
 
 
-def test_the_page_shows_clouds_and_goes_from_one_to_the_next(
-    browser: Browser, viewer: Predictor, entries: list[Entry], tmp_path: Path
-) -> None:
-    page = tmp_path / "view.html"
-    page.write_text(render_view(viewer, entries), encoding="utf-8")
-    browser.open(page.as_uri())
-    browser.wait_until(f"({DRAWN})?.includes('leaf') && document.querySelector('#plot canvas') !== null")
-    assert browser.evaluate(TEXT.format("#name")) == "closed door"
-    assert "truth: closed" in browser.evaluate(TEXT.format("#state"))
-    assert browser.evaluate("document.querySelectorAll('#list li').length") == len(entries)
-    first = pixels(browser)
-    assert count_of(PART_COLORS[Part.LEAF], first) > 50, "the canvas is empty"
-
-    browser.click("#next")
-    browser.wait_until(f"{TEXT.format('#name')} === 'semi_open door'")
-    second = pixels(browser)
-    assert (np.abs(first - second).max(axis=2) > 40)[:, :800].sum() > 500, "the cloud has not changed"
-    assert browser.evaluate("location.hash") == "#2"
-    browser.click("[data-color=channels]")
-    assert browser.evaluate(DRAWN) == ["passed over", "looked at", "camera"]
-    browser.press("ArrowRight")
-    assert browser.evaluate(TEXT.format("#place")) == "3 / 5"
-    assert browser.evaluate(DRAWN) == ["passed over", "looked at", "camera"]
-    browser.click("#list li:nth-child(4) button")
-    assert "glass or missing data" in browser.evaluate(TEXT.format("#reason"))
-    assert browser.evaluate(DRAWN) == ["height", "camera"], "no network looked at it"
-    browser.press("ArrowRight")
-    assert browser.evaluate(TEXT.format("#reason")) == "broken.pcd: is no PCD file"
-    assert browser.evaluate(
-        "document.querySelector('#plot').hidden && document.querySelector('#next').disabled"
+def wait_for_text(page: Page, selector: str, text: str) -> None:
+    page.wait_for_function(
+        "([s, text]) => document.querySelector(s).textContent === text", arg=[selector, text]
     )
-    browser.click("#previous")
-    browser.press("ArrowLeft")
-    browser.click("[data-color=height]")
-    assert browser.evaluate(TEXT.format("#place")) == "3 / 5"
-    assert browser.evaluate(DRAWN) == ["height", "camera"]
-    assert browser.problems == []
 
 
-def test_found_shapes_are_drawn(browser: Browser, sightings: list[NamedCloud], tmp_path: Path) -> None:
-    rule = RulePredictor.load("plane_state")
-    page = tmp_path / "rule.html"
-    page.write_text(render_view(rule, [look(rule, sightings[1])]), encoding="utf-8")
-    browser.open(page.as_uri())
-    names = browser.wait_until(DRAWN)
-    assert {"camera", "wall", "leaf"} <= set(names)
-    assert browser.evaluate("document.querySelector('[data-color=channels]').hidden")
-    assert browser.problems == []
-
-
-def test_a_live_page_follows_until_somebody_looks_back(
-    browser: Browser, viewer: Predictor, entries: list[Entry]
+def test_page_shows_clouds_one_after_the_other(
+    browser: Browser, predictor: Predictor, entries: list[Entry], tmp_path: Path
 ) -> None:
-    with LivePage(render_view(viewer, [], live=True)) as live:
-        browser.open(live.address)
+    page, errors = browser
+    path = tmp_path / "view.html"
+    path.write_text(render_cloud_page(predictor, entries), encoding="utf-8")
+    page.goto(path.as_uri())
+    page.wait_for_function(f"({TRACES})?.includes('leaf') && document.querySelector('#plot canvas') !== null")
+    assert page.text_content("#name") == "closed door"
+    assert "closed" in (page.text_content("#state .badge") or "")
+    assert page.locator("#list li").count() == len(entries)
+    first = pixels(page)
+    assert count_color(PART_COLORS[Part.LEAF], first) > 50, "the canvas is empty"
+
+    page.click("#next")
+    wait_for_text(page, "#name", "semi_open door")
+    second = pixels(page)
+    assert (np.abs(first - second).max(axis=2) > 40)[:, :800].sum() > 500, "the cloud has not changed"
+    assert page.evaluate("location.hash") == "#2"
+    page.click("[data-color=channels]")
+    network_traces = page.evaluate(TRACES)
+    assert len(network_traces) == 3
+    page.keyboard.press("ArrowRight")
+    assert page.text_content("#place") == "3 / 5"
+    assert page.evaluate(TRACES) == network_traces
+    page.click("#list li:nth-child(4) button")
+    assert page.text_content("#reason") == entries[3]["prediction"]["reason"]
+    assert page.evaluate(TRACES) == ["height", "camera"], "the gate abstained, so that no network was used"
+    page.keyboard.press("ArrowRight")
+    assert page.text_content("#reason") == entries[4]["error"]
+    assert page.locator("#plot").is_hidden()
+    assert page.locator("#next").is_disabled()
+    page.click("#previous")
+    page.keyboard.press("ArrowLeft")
+    page.click("[data-color=height]")
+    assert page.text_content("#place") == "3 / 5"
+    assert page.evaluate(TRACES) == ["height", "camera"]
+    assert errors == []
+
+
+def test_detections_are_drawn(browser: Browser, clouds: list[NamedCloud], tmp_path: Path) -> None:
+    page, errors = browser
+    rule = RulePredictor.load("plane_state")
+    path = tmp_path / "rule.html"
+    path.write_text(render_cloud_page(rule, [make_entry(rule, clouds[1])]), encoding="utf-8")
+    page.goto(path.as_uri())
+    names = page.wait_for_function(TRACES).json_value()
+    assert {"camera", "wall", "leaf"} <= set(names)
+    assert page.locator("[data-color=channels]").is_hidden()
+    assert errors == []
+
+
+def test_live_page_follows_until_the_user_goes_back(
+    browser: Browser, predictor: Predictor, entries: list[Entry]
+) -> None:
+    page, errors = browser
+    with LivePage(render_cloud_page(predictor, [], live=True)) as live:
+        page.goto(live.address)
         live.publish("cloud", entries[0])
-        browser.wait_until(f"{TEXT.format('#name')} === 'closed door' && {DRAWN}")
+        wait_for_text(page, "#name", "closed door")
+        page.wait_for_function(TRACES)
         live.publish("cloud", entries[1])
-        browser.wait_until(f"{TEXT.format('#place')} === '2 / 2'")
-        browser.click("#previous")
+        wait_for_text(page, "#place", "2 / 2")
+        page.click("#previous")
         live.publish("cloud", entries[2])
-        browser.wait_until(f"{TEXT.format('#place')} === '1 / 3'")
-        browser.click("#follow")
-        assert browser.evaluate(TEXT.format("#name")) == "open/file.pcd"
+        wait_for_text(page, "#place", "1 / 3")
+        page.click("#follow")
+        assert page.text_content("#name") == "open/file.pcd"
         live.publish("cloud", entries[4])
-        browser.wait_until(f"{TEXT.format('#name')} === 'broken.pcd'")
+        wait_for_text(page, "#name", "broken.pcd")
         live.publish("end", None)
-        browser.wait_until(f"{TEXT.format('#connection')} === 'ended'")
-    assert browser.problems == []
+        wait_for_text(page, "#connection", "ended")
+    assert errors == []

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The command `doorstate`: parse, call, print; the only catcher of our own exceptions.
+"""Command line `doorstate`: one module a command, each of which parses, calls the library and prints.
 
-Heavy imports happen inside the commands, so that `--help` answers at once.
-Exit codes: 0 all well, 1 something could not be done (said in one line), 2 wrong usage, 130 stopped by the user.
+Modules that take long to import are imported inside the commands, so that `--help` is quick.
+Exit codes: 0 success, 1 failure (one line on standard error), 2 wrong usage, 130 interrupted.
 """
 
 from __future__ import annotations
@@ -13,35 +13,25 @@ from typing import Annotated
 import typer
 
 from doorstate import __version__
-from doorstate.cli.dataset import join, prepare, simulate
+from doorstate.cli.compare import compare
 from doorstate.cli.evaluate import evaluate
 from doorstate.cli.export import export
 from doorstate.cli.export_sdf import export_sdf
-from doorstate.cli.predict import info, predict
+from doorstate.cli.flags import format_flag
+from doorstate.cli.info import info
+from doorstate.cli.join import join
+from doorstate.cli.predict import predict
+from doorstate.cli.prepare import prepare
+from doorstate.cli.report import report
 from doorstate.cli.resolution import resolution
 from doorstate.cli.serve import serve
-from doorstate.cli.training import compare, report, train
+from doorstate.cli.simulate import simulate
+from doorstate.cli.train import train
 from doorstate.cli.transfer import transfer
 from doorstate.cli.view import view
 from doorstate.errors import ConfigError, DoorstateError
 
-
-def _version(wanted: bool) -> None:
-    if wanted:
-        print(__version__)  # noqa: T201
-        raise typer.Exit
-
-
-app = typer.Typer(
-    name="doorstate",
-    help="The state of a door (open, semi-open, closed) from one depth-camera point cloud.",
-    no_args_is_help=True,
-    add_completion=False,
-    rich_markup_mode=None,
-    pretty_exceptions_enable=False,
-    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
-)
-for command in (
+_COMMANDS = (
     simulate,
     prepare,
     join,
@@ -57,30 +47,46 @@ for command in (
     export,
     export_sdf,
     info,
-):
+)
+_RESUMABLE = {"simulate", "prepare", "train", "compare", "resolution", "transfer"}
+
+app = typer.Typer(
+    name="doorstate",
+    help="Predict the state of a door (open, semi-open, closed) from one depth-camera point cloud.",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
+)
+for command in _COMMANDS:
     app.command()(command)
+
+
+def _print_version(requested: bool) -> None:
+    if requested:
+        print(__version__)  # noqa: T201
+        raise typer.Exit
 
 
 @app.callback()
 def _options(
     version: Annotated[
-        bool, typer.Option("--version", help="Say the version and end.", is_eager=True, callback=_version)
+        bool,
+        typer.Option("--version", help="Print the version and exit.", is_eager=True, callback=_print_version),
     ] = False,
 ) -> None:
-    """What stands before a command."""
-
-
-_RESUMABLE = {"simulate", "prepare", "train", "compare", "resolution", "transfer"}
+    """Parse the options before the command."""
 
 
 def main() -> None:
-    """Run the command line; our own exceptions become one line on standard error."""
+    """Run the command line, and print errors of this package as one line on standard error."""
     try:
         app()
     except DoorstateError as error:
-        print(f"doorstate: {error}", file=sys.stderr)  # noqa: T201
+        print(f"doorstate: {error.describe(format_flag)}", file=sys.stderr)  # noqa: T201
         sys.exit(2 if isinstance(error, ConfigError) else 1)
     except KeyboardInterrupt:
-        goes_on = "; the same command goes on from here" if _RESUMABLE & set(sys.argv[1:2]) else ""
-        print(f"doorstate: stopped{goes_on}", file=sys.stderr)  # noqa: T201
+        advice = "; run the same command again to continue" if _RESUMABLE & set(sys.argv[1:2]) else ""
+        print(f"doorstate: interrupted{advice}", file=sys.stderr)  # noqa: T201
         sys.exit(130)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`evaluate`: methods against recorded frames whose states are known."""
+"""`doorstate evaluate`."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from doorstate.evaluation.frames import Asked, Methods
     from doorstate.evaluation.table import Table
 
-_DOOR = "door"  # the column that names doors, where there is one
+_DOOR_COLUMN = "door"
 _PAGE = "frames.html"
 
 
@@ -35,34 +35,36 @@ def evaluate(
     folder: Annotated[
         Path,
         typer.Argument(
-            help="Folder with an index.csv, or with sub-folders named after states, or of a --layout."
+            help="Folder with an index.csv, with one sub-folder for each state, or with the layout of --layout."
         ),
     ],
     network: Annotated[
-        list[str] | None, typer.Option(help="Network whose packaged weights to ask; repeatable.")
+        list[str] | None, typer.Option(help="Name of packaged weights; repeatable. [default: pointnet2]")
     ] = None,
     weights: Annotated[
-        list[Path] | None, typer.Option(help="A weights file of your own; repeatable.")
+        list[Path] | None, typer.Option(help="Weights file (.safetensors or .onnx); repeatable.")
     ] = None,
-    rule: Annotated[list[str] | None, typer.Option(help="A rule to ask; repeatable.")] = None,
+    rule: Annotated[list[str] | None, typer.Option(help="Name of a rule; repeatable.")] = None,
     points: PointCount = None,
     group: Annotated[
         str | None,
-        typer.Option(help="Column of the index by which frames depend on each other; door, if there is one."),
+        typer.Option(
+            help="Column whose equal values mark dependent frames, for confidence intervals. [default: door, if any]"
+        ),
     ] = None,
     by: Annotated[
         list[str] | None,
         typer.Option(
-            help="Scores apart by this column, or COLUMN:WORD, by whether it has a word; repeatable."
+            help="Report scores by the values of a column, or with COLUMN:WORD by whether it holds a word; repeatable."
         ),
     ] = None,
     out: Annotated[
         Path | None, typer.Option(help="Folder for predictions.csv, metrics.json, tables/ and frames.html.")
     ] = None,
     everything: Annotated[
-        bool, typer.Option("--all", help="Show all frames in frames.html, not only those with errors.")
+        bool, typer.Option("--all", help="Show all frames in frames.html, not only errors.")
     ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print metrics as one JSON object.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the metrics as one JSON object.")] = False,
     layout: LayoutName = None,
     frame: Frame = "body",
     roll: Roll = 0,
@@ -74,12 +76,12 @@ def evaluate(
     cx: Focal = None,
     cy: Focal = None,
 ) -> None:
-    """Ask networks and rules about recorded clouds or depth images with known states, and count.
+    """Evaluate networks and rules on clouds or depth images with known states.
 
-    An index.csv has a line for each file: file, state, and where they are known fx, fy, cx, cy, width, height
-    (pixels), depth_unit_m, frame, roll_deg, door, rgb (a colour image to show), and whatever else. A state that is
-    none of the three marks a frame without a clear door; those are reported apart. Exit code 1: some files could not
-    be read.
+    An index.csv has one row for each file, with the columns file and state. Optional columns are fx, fy, cx, cy,
+    width, height (pixels), depth_unit_m, frame, roll_deg, door, rgb (a colour image to show) and any others. A state
+    other than the three marks a frame without a clear door; such frames are reported separately. The exit code is 1
+    if a file could not be read.
 
     \b
     Examples:
@@ -89,29 +91,28 @@ def evaluate(
       doorstate evaluate DeepDoors2 --layout deepdoors2 --weights mine.safetensors --by split --json
     """
     from doorstate._files import check_writable
-    from doorstate.cli.console import err, progress_bar
+    from doorstate.cli.console import progress_bar, stderr
     from doorstate.dataset.labelled import check_column, labelled_frames
     from doorstate.evaluation.frame_tables import NO_GROUP, frame_notes, frame_tables
     from doorstate.evaluation.frames import ask
 
     if everything and out is None:
-        raise ConfigError("--all is for the page of --out FOLDER")
+        raise ConfigError("--all needs --out")
     options = read_options(frame, roll, units, depth_scale, intrinsics, (fx, fy, cx, cy), layout)
     frames = labelled_frames(folder, options, layout)
-    if group is None and any(each.columns.get(_DOOR) for each in frames):
-        group = _DOOR
+    if group is None and any(frame.columns.get(_DOOR_COLUMN) for frame in frames):
+        group = _DOOR_COLUMN
     for column in (*(by or ()), *([group] if group else ())):
         check_column(frames, column.partition(":")[0])
     if out is not None:
         check_writable(out / _PAGE)
     methods = _methods(network, weights, rule, points)
-    with progress_bar("Asking") as progress:
+    with progress_bar("Predicting") as progress:
         asked = ask(methods, frames, progress)
-    for each, reason in asked.unreadable:
-        message = f"{each.file}: {reason.removeprefix(f'{each.file}: ')}"
-        err.print(message, style="red", soft_wrap=True)
+    for frame_row, reason in asked.unreadable:
+        stderr.print(f"{frame_row.file}: {reason}", style="red", soft_wrap=True)
     if not asked.frames:
-        raise CloudReadError(f"{folder}: none of {len(frames)} files could be read")
+        raise CloudReadError(f"none of {len(frames)} files could be read", path=folder)
     metrics = asked.metrics(group, by or ())
     tables, notes = frame_tables(metrics, group or NO_GROUP), frame_notes(metrics, group or NO_GROUP)
     if as_json:
@@ -120,9 +121,9 @@ def evaluate(
         _print(tables, notes)
     if out is not None:
         page = _write(out, folder, methods, asked, metrics, tables, notes, everything)
-        err.print(f"{page} shows the frames", soft_wrap=True)
+        stderr.print(f"page: {page}", soft_wrap=True)
     if asked.unreadable:
-        err.print(f"{len(asked.unreadable)} of {len(frames)} files could not be read and are not counted")
+        stderr.print(f"{len(asked.unreadable)} of {len(frames)} files could not be read and are not counted")
         raise typer.Exit(1)
 
 
@@ -132,36 +133,34 @@ def _methods(
     rules: Sequence[str] | None,
     points: int | None,
 ) -> Methods:
-    """Who is asked, by name; the default network if nobody is named."""
+    """Return the predictors by name; the default network if none is given."""
     from doorstate.inference.loading import load_predictor
     from doorstate.inference.predictor import DEFAULT_NETWORK
 
-    asked: list[tuple[str | None, Path | None, str | None]] = [
+    choices: list[tuple[str | None, Path | None, str | None]] = [
         *((name, None, None) for name in networks or ()),
         *((None, path, None) for path in weights or ()),
         *((None, None, name) for name in rules or ()),
     ] or [(DEFAULT_NETWORK, None, None)]
-    names = [rule or (path.stem if path else str(network)) for network, path, rule in asked]
-    if twice := [name for name in names if names.count(name) > 1]:
-        raise ConfigError(
-            f"{twice[0]} is asked for twice: name each method once, and weights files differently"
-        )
-    mixed = networks or weights  # rules beside them look at all points
+    names = [rule or (path.stem if path else str(network)) for network, path, rule in choices]
+    if duplicates := [name for name in names if names.count(name) > 1]:
+        raise ConfigError(f"{duplicates[0]} is given twice: methods and weights files need different names")
+    mixed = networks or weights  # --points is for these; rules use all points
     return {
         name: load_predictor(network, path, rule, None if rule and mixed else points)
-        for name, (network, path, rule) in zip(names, asked, strict=True)
+        for name, (network, path, rule) in zip(names, choices, strict=True)
     }
 
 
 def _print(tables: Mapping[str, Table], notes: Sequence[str]) -> None:
-    from doorstate.cli.console import out, print_table
+    from doorstate.cli.console import print_table, stdout
 
     for note in notes:
-        out.print(note, soft_wrap=True)
+        stdout.print(note, soft_wrap=True)
     for table in tables.values():
         print_table(table.title, table.columns, table.rows)
         if table.note:
-            out.print(table.note, soft_wrap=True)
+            stdout.print(table.note, soft_wrap=True)
 
 
 def _write(
@@ -182,15 +181,15 @@ def _write(
 
     name = folder.resolve().name
     write_csv(out / "predictions.csv", asked.rows())
-    whole: dict[str, Any] = {
+    header: dict[str, Any] = {
         "doorstate": __version__,
         "folder": name,
-        "not_read": {f.file: why for f, why in asked.unreadable},
+        "not_read": {frame.file: reason for frame, reason in asked.unreadable},
     }
-    write_text(out / "metrics.json", json.dumps({**whole, **metrics}, indent=2) + "\n")
+    write_text(out / "metrics.json", json.dumps({**header, **metrics}, indent=2) + "\n")
     save_tables(tables, out / "tables")
     chosen = choose_frames(asked, everything)
-    with progress_bar("Looking") as progress:
+    with progress_bar("Writing the page") as progress:
         cards = frame_cards(asked, methods, chosen, progress)
     page = out / _PAGE
     write_text(page, render_frame_page(name, tables, asked, cards, notes))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The command that writes simulated scenes as worlds for Gazebo."""
+"""`doorstate export-sdf`."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from doorstate.errors import ConfigError
 
 
 def export_sdf(
-    source: Annotated[Path, typer.Argument(help="A simulated or prepared folder.")],
-    samples: Annotated[list[str], typer.Argument(help="sample_id of the rows to export.")],
-    out: Annotated[Path, typer.Option(help="Folder for the worlds.")] = Path(),
+    source: Annotated[Path, typer.Argument(help="Simulated or prepared folder.")],
+    samples: Annotated[list[str], typer.Argument(help="Samples to export, by their sample_id.")],
+    out: Annotated[Path, typer.Option(help="Folder for the world files.")] = Path(),
 ) -> None:
-    """Write simulated scenes as SDF worlds with their depth camera, for Gazebo.
+    """Export simulated scenes as SDF worlds for Gazebo, with their depth camera.
 
     \b
     Examples:
@@ -24,17 +24,18 @@ def export_sdf(
       doorstate export-sdf data/ogurob p0655-closed p0655-open --out worlds
     """
     from doorstate._files import read_csv, write_text
-    from doorstate.cli.console import out as stdout
+    from doorstate.cli.console import stdout
     from doorstate.simulation.manifest import unflatten
     from doorstate.simulation.run import MANIFEST
     from doorstate.simulation.sdf import sdf_world
 
-    if not (source / MANIFEST).is_file():
-        raise ConfigError(f"{source}: is no simulated folder: it has no {MANIFEST}")
-    rows = {row.get("sample_id", ""): row for row in read_csv(source / MANIFEST)}
+    manifest = source / MANIFEST
+    if not manifest.is_file():
+        raise ConfigError(f"not a simulated folder: no {MANIFEST}", path=source)
+    rows = {row.get("sample_id", ""): row for row in read_csv(manifest)}
     for sample in samples:
         if sample not in rows:
-            raise ConfigError(f"{source / MANIFEST}: holds no sample {sample!r}")
+            raise ConfigError(f"no sample {sample!r}", path=manifest)
     for sample in samples:
         world = sdf_world(unflatten(rows[sample]), sample)
         write_text(out / f"{sample}.sdf", world)

@@ -1,64 +1,76 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The command that finds out how many points are enough."""
+"""`doorstate resolution`."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+from doorstate.cli.options import Jobs
+
+if TYPE_CHECKING:
+    from doorstate.training.resolution import ResolutionStudy
 
 _TIMED_CLOUDS, _REPEATS = 9, 3
 
 
 def resolution(
-    study: Annotated[Path, typer.Argument(help="A study file.")],
-    out: Annotated[Path | None, typer.Option(help="Folder of the study; runs/NAME if not given.")] = None,
-    jobs: Annotated[int, typer.Option(help="Runs at the same time.", min=1)] = 1,
+    study: Annotated[Path, typer.Argument(help="Study file (TOML).")],
+    out: Annotated[Path | None, typer.Option(help="Folder of the study. [default: runs/NAME]")] = None,
+    jobs: Jobs = 1,
 ) -> None:
-    """Accuracy and time of finished weights on fewer points; stopped at any moment, it goes on where it was.
+    """Measure accuracy and time of trained networks with fewer points.
 
-    A study file is TOML: dataset, start_from (a finished comparison), points (a list); protocol, networks, folds, seed
-    and heads as of that comparison; fine_tuning, fields of a recipe, if weights shall be trained a little too.
+    A study file has the keys dataset, start_from (a finished comparison) and points (a list). Optional keys are
+    protocol, networks, folds, seed and heads (as in the comparison) and the table [fine_tuning] with fields of a
+    recipe. An interrupted study continues where it stopped.
 
     \b
     Examples:
       doorstate resolution paper/experiments/resolution.toml
       doorstate resolution paper/experiments/resolution.toml --jobs 2 --out runs/points
     """
-    from doorstate._files import write_csv
-    from doorstate._memory import keep_freed_memory
-    from doorstate.cli.console import print_table, progress_bar
-    from doorstate.cli.training import compare_live
-    from doorstate.dataset.store import open_dataset
+    from doorstate.cli.compare import compare_with_display
+    from doorstate.cli.console import print_table
     from doorstate.evaluation.resolution import (
         LATENCY,
         load_resolution,
         resolution_table,
         write_resolution,
     )
-    from doorstate.inference.predictor import Predictor, median_milliseconds
     from doorstate.training.resolution import load_study
-    from doorstate.training.run_folder import AS_TRAINED, run_of
 
     settings = load_study(study)
     folder = out or Path("runs") / settings.name
     for name, experiment in settings.experiments():
-        compare_live(experiment, folder / name, jobs)
-
+        compare_with_display(experiment, folder / name, jobs)
     if not (folder / LATENCY).is_file():
-        keep_freed_memory()  # as `doorstate predict` does
-        clouds = open_dataset(Path(settings.dataset)).raw_clouds(_TIMED_CLOUDS)
-        timed = []
-        with progress_bar("Timing") as update:
-            wanted = [(network, points) for network in settings.networks for points in settings.points]
-            for done, (network, points) in enumerate(wanted):
-                weights = run_of(folder / f"{AS_TRAINED}-{points}", network, 0).weights
-                median_ms = median_milliseconds(Predictor.load(weights, points), clouds, _REPEATS)
-                timed.append({"network": network, "points": str(points), "median_ms": f"{median_ms:.2f}"})
-                update(done + 1, len(wanted))
-        write_csv(folder / LATENCY, timed)
-
+        _measure_latency(settings, folder)
     write_resolution(folder, folder / "report")
     table = resolution_table(load_resolution(folder))
     print_table(table.title, table.columns, table.rows)
+
+
+def _measure_latency(settings: ResolutionStudy, folder: Path) -> None:
+    """Write the median time of each network with each number of points."""
+    from doorstate._files import write_csv
+    from doorstate._memory import keep_freed_memory
+    from doorstate.cli.console import progress_bar
+    from doorstate.dataset.store import open_dataset
+    from doorstate.evaluation.resolution import LATENCY
+    from doorstate.inference.predictor import Predictor, median_milliseconds
+    from doorstate.training.run_folder import AS_TRAINED, run_of
+
+    keep_freed_memory()  # as doorstate predict does
+    clouds = open_dataset(Path(settings.dataset)).raw_clouds(_TIMED_CLOUDS)
+    cases = [(network, points) for network in settings.networks for points in settings.points]
+    rows = []
+    with progress_bar("Timing") as progress:
+        for done, (network, points) in enumerate(cases, 1):
+            weights = run_of(folder / f"{AS_TRAINED}-{points}", network, 0).weights
+            median_ms = median_milliseconds(Predictor.load(weights, points), clouds, _REPEATS)
+            rows.append({"network": network, "points": str(points), "median_ms": f"{median_ms:.2f}"})
+            progress(done, len(cases))
+    write_csv(folder / LATENCY, rows)

@@ -14,7 +14,7 @@ from doorstate.clouds.preparation import is_measured
 from doorstate.errors import CameraError, DoorstateError, summarize_exception
 from doorstate.inference.predictor import Prediction, Predictor
 from doorstate.inference.rule_predictor import RulePredictor
-from doorstate.inference.serialization import described
+from doorstate.inference.serialization import prediction_to_dict
 from doorstate.inference.stream import FilteredState, Holding, StateFilter
 from doorstate.inference.watch_settings import MESSAGE_TYPES, WatchSettings
 from doorstate.io.camera import Intrinsics
@@ -55,7 +55,7 @@ class DoorReport:
     @property
     def values(self) -> dict[str, str]:
         """Everything by name, as text: of this message alone, then after the filter."""
-        said = described(self.prediction)
+        said = prediction_to_dict(self.prediction)
         values = {"state": self.state, "raw_state": said.pop("state") or UNKNOWN, "reason": ""}
         values |= said.pop("probabilities") | said
         values |= {f"smoothed_{name}": round(p, 6) for name, p in self.filtered.probabilities.items()}

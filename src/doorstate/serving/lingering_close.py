@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""An answer given before the client has sent everything must reach it, and must not wait for it."""
+"""Middleware for responses that are sent before the request was received completely."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ _LINGER_S = 2.0
 
 
 class LingeringClose:
-    """ASGI middleware: after an early answer throws away what still comes, for two seconds, and closes the connection.
+    """ASGI middleware: after an early response, discard the rest of the request for two seconds, then close.
 
-    To close at once would reset the connection, and the client would see that in place of the answer (RFC 9112, 9.6).
+    Closing at once would reset the connection, and the client might never see the response (RFC 9112, section 9.6).
     """
 
     def __init__(self, app: ASGIApp) -> None:
@@ -22,11 +22,12 @@ class LingeringClose:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] != "http":
-            return await self._app(scope, receive, send)
+            await self._app(scope, receive, send)
+            return
         headers = dict(scope["headers"])
         unread = b"transfer-encoding" in headers or headers.get(b"content-length", b"0") != b"0"
 
-        async def watched_receive() -> Message:
+        async def tracked_receive() -> Message:
             nonlocal unread
             message = await receive()
             unread = message["type"] == "http.request" and message.get("more_body", False)
@@ -41,8 +42,7 @@ class LingeringClose:
                 with suppress(TimeoutError):
                     async with asyncio.timeout(_LINGER_S):
                         while unread:
-                            await watched_receive()
+                            await tracked_receive()
             await send(message)
 
-        await self._app(scope, watched_receive, lingering_send)
-        return None
+        await self._app(scope, tracked_receive, lingering_send)

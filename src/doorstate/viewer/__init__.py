@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pages that show clouds, predictions and recordings."""
+"""HTML pages that show clouds, predictions and recordings in 3D."""

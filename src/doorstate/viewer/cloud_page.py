@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Clouds and what was said of them, as one HTML page that loads nothing from anywhere."""
+"""HTML page with clouds in 3D and their predictions; it loads no other file."""
 
 from __future__ import annotations
 
@@ -10,80 +10,87 @@ import numpy as np
 from numpy.typing import NDArray
 
 from doorstate.clouds.preparation import NUM_POINTS, CloudSpec, prepare_cloud
-from doorstate.errors import DoorstateError
+from doorstate.errors import DoorstateError, WriteParameter, python_parameter
 from doorstate.evaluation.detections import encode_detections
 from doorstate.evaluation.pages import encode_bytes, encode_cloud, render_page
 from doorstate.evaluation.views import STATE_COLORS
 from doorstate.inference.onnx_backend import OnnxBackend
 from doorstate.inference.predictor import Predictor
 from doorstate.inference.rule_predictor import RulePredictor
-from doorstate.inference.serialization import described
+from doorstate.inference.serialization import prediction_to_dict
 from doorstate.types import STATES, Points
 from doorstate.viewer.named_clouds import NamedCloud
 
 Entry = dict[str, Any]
-"""One cloud as the page takes it; it holds an `error`, or an `answer` and a `cloud`."""
+"""Cloud as the page gets it: `name` and `truth`, and either `error` or `prediction`, `cloud` and `shapes`."""
 
-CHANNEL_PARTS = 32  # channels are counted in, so that two bytes hold 0 to 2047
+CHANNEL_STEPS = 32  # a channel count is stored in steps of 1/32, so that two bytes hold 0 to 2047
 
 
-def look(predictor: Predictor | RulePredictor, sighting: NamedCloud) -> Entry:
-    """Ask for the state of a cloud, and keep the points that were looked at, at most 4096.
+def make_entry(
+    predictor: Predictor | RulePredictor,
+    named: NamedCloud,
+    parameter: WriteParameter = python_parameter,
+) -> Entry:
+    """Predict a cloud, and encode the prediction with the points that were used, at most 4096.
 
     Args:
-        predictor: a network or a rule.
-        sighting: of a cloud.
+        predictor: network or rule.
+        named: cloud.
+        parameter: how errors write parameters.
     """
-    entry: Entry = {"name": sighting.name, "truth": sighting.truth}
+    entry: Entry = {"name": named.name, "truth": named.truth}
     try:
-        if isinstance(sighting.cloud, DoorstateError):
-            raise sighting.cloud
-        answer = predictor(sighting.cloud)
+        if isinstance(named.cloud, DoorstateError):
+            raise named.cloud
+        prediction = predictor(named.cloud)
         if isinstance(predictor, Predictor):
-            prepared = predictor.prepare(sighting.cloud)
+            prepared = predictor.prepare(named.cloud)
         else:
-            prepared = prepare_cloud(sighting.cloud, CloudSpec(thin=True))
+            prepared = prepare_cloud(named.cloud, CloudSpec(thin=True))
     except DoorstateError as error:
-        return entry | {"error": str(error)}
-    channels = None if answer.state is None else _channels(predictor, prepared.points)
-    parts = None if sighting.parts is None else sighting.parts[prepared.indices[:NUM_POINTS]]
-    if channels is not None:
-        counted = np.rint(channels[:NUM_POINTS] * CHANNEL_PARTS).astype("<u2")
-        entry["channels"] = encode_bytes(counted.tobytes())
+        return entry | {"error": error.describe(parameter, with_path=False)}
+    counts = None if prediction.state is None else _channel_counts(predictor, prepared.points)
+    if counts is not None:
+        steps = np.rint(counts[:NUM_POINTS] * CHANNEL_STEPS).astype("<u2")
+        entry["channels"] = encode_bytes(steps.tobytes())
+    parts = None if named.parts is None else named.parts[prepared.indices[:NUM_POINTS]]
     return entry | {
-        "answer": described(answer),
+        "prediction": prediction_to_dict(prediction),
         "cloud": encode_cloud(prepared.points[:NUM_POINTS], parts),
-        "shapes": encode_detections(answer.detections),
+        "shapes": encode_detections(prediction.detections),
     }
 
 
-def _channels(predictor: Predictor | RulePredictor, points: Points) -> NDArray[np.float32] | None:
+def _channel_counts(predictor: Predictor | RulePredictor, points: Points) -> NDArray[np.float32] | None:
+    """Return (N,) channel counts of the points; None where these are not defined."""
     if isinstance(predictor, RulePredictor) or isinstance(predictor.network, OnnxBackend):
         return None
-    # With torch, which an exported network does without.
-    from doorstate.viewer.critical_points import critical_points
+    from doorstate.viewer.critical_points import critical_points  # needs torch, an exported network does not
 
     return critical_points(predictor.network, points)
 
 
-def render_view(predictor: Predictor | RulePredictor, entries: Sequence[Entry], *, live: bool = False) -> str:
-    """The page.
+def render_cloud_page(
+    predictor: Predictor | RulePredictor, entries: Sequence[Entry], *, live: bool = False
+) -> str:
+    """Return the page.
 
     Args:
-        predictor: who was asked.
-        entries: of `look`; may be none in a live page.
-        live: more entries come as server-sent events from `events` beside the page.
+        predictor: network or rule, to be named on the page.
+        entries: results of `make_entry`; may be empty in a live page.
+        live: receive more entries as server-sent events from the address `events`.
     """
     return render_page(
         "view.html.j2",
         "doorstate.viewer",
-        asked=str(predictor),
+        predictor=str(predictor),
         live=live,
         page_data={
             "entries": list(entries),
             "live": live,
             "states": STATES,
             "state_colors": STATE_COLORS,
-            "channel_parts": CHANNEL_PARTS,
+            "channel_steps": CHANNEL_STEPS,
         },
     )

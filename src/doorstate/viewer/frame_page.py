@@ -22,7 +22,7 @@ from doorstate.evaluation.pages import render_page
 from doorstate.evaluation.table import Table
 from doorstate.evaluation.views import DETECTION_COLORS, STATE_COLORS
 from doorstate.types import STATES, Points
-from doorstate.viewer.cloud_page import CHANNEL_PARTS, Entry, look
+from doorstate.viewer.cloud_page import CHANNEL_STEPS, Entry, make_entry
 from doorstate.viewer.named_clouds import NamedCloud
 
 MOST_CARDS = 200
@@ -86,14 +86,14 @@ def frame_cards(
     for done, number in enumerate(chosen, 1):
         frame = asked.frames[number]
         cloud = frame.read()
-        sighting = NamedCloud(frame.file, cloud, truth=frame.label if frame.label in STATES else "")
+        named = NamedCloud(frame.file, cloud, truth=frame.label if frame.label in STATES else "")
         cards.append(
             FrameCard(
                 frame.file,
                 frame.label,
                 tuple(f"{name.replace('_', ' ')}: {value}" for name, value in _told(frame).items()),
                 _pictures(frame, cloud),
-                {name: look(method, sighting) for name, method in methods.items()},
+                {name: make_entry(method, named) for name, method in methods.items()},
                 tuple(asked.wrong(number)),
             )
         )
@@ -136,7 +136,7 @@ def render_frame_page(
         shapes=_shapes(cards),
         page_data={
             "cards": {card.file: {name: _drawn(view) for name, view in card.views.items()} for card in cards},
-            "channel_parts": CHANNEL_PARTS,
+            "channel_steps": CHANNEL_STEPS,
         },
     )
 

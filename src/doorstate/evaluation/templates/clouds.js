@@ -1,10 +1,10 @@
 "use strict";
-// The clouds of a page: its data, decoding, and 3D by Plotly, which is made a script when the first cloud needs it.
+// Clouds of a page: data, decoding, and plots by Plotly, whose text becomes a script when the first cloud needs it.
 const clouds = (() => {
   const data = JSON.parse(document.getElementById("page-data").textContent);
   const part = Object.fromEntries(data.parts.map((p) => [p.value, p]));
   const bytes = (text) => Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
-  const EYE = 1.55; // how far from the middle; near enough that the cloud fills the picture
+  const EYE = 1.55; // distance of the eye from the middle, in Plotly's units; the cloud fills the plot
   const MUTED = "rgba(128,128,128,.45)";
   const HEAT = [[0, "#9aa3ae"], [0.3, "#f2b632"], [0.65, "#ee6a1f"], [1, "#d3114f"]];
   const pick = (values, members) => members.map((i) => values[i]);
@@ -17,25 +17,25 @@ const clouds = (() => {
     return { count, x: axis(0), y: axis(1), z: axis(2), parts: parts && bytes(parts) };
   }
 
-  const everyPoint = (cloud) => Array.from({ length: cloud.count }, (_, i) => i);
+  const allIndices = (cloud) => Array.from({ length: cloud.count }, (_, i) => i);
 
-  // Some points of a cloud; the marker says how.
+  // Trace of some points of a cloud.
   const points = (cloud, members, name, marker, hover = "") => ({
     type: "scatter3d", mode: "markers", name, marker, hovertemplate: `x %{x:.2f}, y %{y:.2f}, z %{z:.2f} m${hover}`,
     x: pick(cloud.x, members), y: pick(cloud.y, members), z: pick(cloud.z, members),
   });
 
   const byHeight = (cloud) =>
-    [points(cloud, everyPoint(cloud), "height", { size: 2, color: Array.from(cloud.z), colorscale: "Viridis" })];
+    [points(cloud, allIndices(cloud), "height", { size: 2, color: Array.from(cloud.z), colorscale: "Viridis" })];
 
   const byPart = (cloud) => [...new Set(cloud.parts)].sort((a, b) => a - b).map((value) => {
-    const members = everyPoint(cloud).filter((i) => cloud.parts[i] === value);
+    const members = allIndices(cloud).filter((i) => cloud.parts[i] === value);
     return points(cloud, members, part[value].name, { size: 2, color: part[value].color });
   });
 
   function channelsOf(entry) {
     const raw = new DataView(bytes(entry.channels).buffer);
-    return Float32Array.from({ length: raw.byteLength / 2 }, (_, i) => raw.getUint16(2 * i, true) / data.channel_parts);
+    return Float32Array.from({ length: raw.byteLength / 2 }, (_, i) => raw.getUint16(2 * i, true) / data.channel_steps);
   }
 
   function mostChannels(channels) {
@@ -44,19 +44,19 @@ const clouds = (() => {
   }
 
   function byChannels(cloud, channels) {
-    const everyone = everyPoint(cloud);
-    const [seen, passed] = [everyone.filter((i) => channels[i] > 0), everyone.filter((i) => !(channels[i] > 0))];
-    const values = seen.map((i) => channels[i]);
+    const all = allIndices(cloud);
+    const [winners, rest] = [all.filter((i) => channels[i] > 0), all.filter((i) => !(channels[i] > 0))];
+    const values = winners.map((i) => channels[i]);
     const high = mostChannels(channels);
-    const looked = points(cloud, seen, "looked at", {
+    const used = points(cloud, winners, "used", {
       size: values.map((value) => 2.5 + 4 * Math.sqrt(Math.min(1, value / high))), line: { width: 0 },
       color: values, colorscale: HEAT, cmin: 0, cmax: high, showscale: true,
       colorbar: { title: { text: "channels", side: "top" }, thickness: 10, len: 0.6, outlinewidth: 0 },
     }, "<br>%{marker.color:.1f} channels");
-    return [points(cloud, passed, "passed over", { size: 1.5, color: MUTED }), looked];
+    return [points(cloud, rest, "not used", { size: 1.5, color: MUTED }), used];
   }
 
-  // One metre ahead, to the left and up from it: the scale of the picture, in the colours that ROS gives these axes.
+  // Axes of the camera, one metre long, in the colours of ROS: red forward, green left, blue up.
   const camera = () => ({
     type: "scatter3d", mode: "lines+text", name: "camera", showlegend: false, hovertemplate: "camera",
     x: [0, 1, null, 0, 0, null, 0, 0], y: [0, 0, null, 0, 1, null, 0, 0], z: [0, 0, null, 0, 0, null, 0, 1],
@@ -73,7 +73,7 @@ const clouds = (() => {
     };
   }
 
-  // What does not change from cloud to cloud, in the colours of the page: from behind and above the camera, as Figure 2.
+  // Layout in the colours of the page; the eye is behind and above the camera, as in Figure 2.
   function layout() {
     const ink = getComputedStyle(document.body).color;
     const hidden = { visible: false };
@@ -107,7 +107,7 @@ const clouds = (() => {
     return Array.from(z, (value) => `hsl(${260 - (200 * (value - low)) / (high - low || 1)} 70% 42%)`);
   }
 
-  // The same oblique view as Figure 2: from behind and above the camera, near points last.
+  // Draw a cloud on a canvas in the same oblique view, near points last.
   function preview(canvas, cloud, colors, shapes) {
     const [down, level] = [Math.sin(data.elevation), Math.cos(data.elevation)];
     const [forward, right, up] = [[level, 0, -down], [0, -1, 0], [down, 0, level]];
@@ -116,7 +116,7 @@ const clouds = (() => {
     const scale = window.devicePixelRatio || 1;
     const [width, height] = [canvas.clientWidth * scale, canvas.clientHeight * scale];
     [canvas.width, canvas.height] = [width, height];
-    // Flying pixels far off must not make the rest small.
+    // Far outliers must not make the door small.
     const span = (values) => {
       const sorted = values.slice().sort();
       const [low, high] = [0.05, 0.95].map((share) => sorted[Math.round(share * (sorted.length - 1))]);
@@ -156,7 +156,7 @@ const clouds = (() => {
   }
 
   return {
-    data, part, bytes, decode, points, everyPoint, byHeight, byPart, channelsOf, byChannels, partColors, heightColors,
+    data, part, bytes, decode, points, allIndices, byHeight, byPart, channelsOf, byChannels, partColors, heightColors,
     channelColors, preview, camera, shape, shapeColor, layout, plotly,
     config: { displaylogo: false, responsive: true },
   };

@@ -1,28 +1,28 @@
 (() => {
   const { data } = clouds;
   const entries = [];
-  const MOST = 300; // of a stream; older ones are forgotten
+  const MAX_ENTRIES = 300; // of a stream; older ones are dropped
   const colors = ["part", "height", "channels"];
   const dark = matchMedia("(prefers-color-scheme: dark)");
   const element = (id) => document.getElementById(id);
   const [plot, list, follow] = [element("plot"), element("list"), element("follow")];
   let current = -1;
-  let forgotten = 0; // of the stream's first
-  let wanted = null; // colour that was asked for
+  let dropped = 0; // entries at the start of the stream
+  let selectedColor = null;
 
   const make = (tag, properties = {}, ...children) => {
     const made = Object.assign(document.createElement(tag), properties);
     made.append(...children);
     return made;
   };
-  const words = (state) => state.replace("_", "-");
+  const stateName = (state) => state.replace("_", "-");
   const tinted = (node, state) => (node.style.setProperty("--c", data.state_colors[state]), node);
   const dot = (state) => (state ? tinted(make("i"), state) : make("i"));
-  const said = ({ answer, error }) => (error ? "error" : answer.state ? words(answer.state) : "no answer");
-  const isWrong = ({ truth, answer }) => truth !== "" && answer && answer.state !== null && answer.state !== truth;
+  const result = ({ prediction, error }) => (error ? "error" : prediction.state ? stateName(prediction.state) : "abstained");
+  const isWrong = ({ truth, prediction }) => truth !== "" && prediction && prediction.state !== null && prediction.state !== truth;
 
   // ---- colours ---------------------------------------------------------------------------------------------
-  const can = (entry, color) =>
+  const hasColor = (entry, color) =>
     color === "height" || Boolean(color === "part" ? entry.cloud.parts : entry.channels);
 
   function traces(entry, color) {
@@ -33,47 +33,47 @@
   }
 
   const NOTES = {
-    part: "Parts are known: this cloud is simulated.",
+    part: "Parts of the simulated scene.",
     height: "",
-    channels: "How many channels of the network's global feature come from each point (the critical points of its maximum).",
+    channels: "Number of channels of the network's global feature that come from each point (critical points).",
   };
 
   // ---- one cloud -------------------------------------------------------------------------------------------
   function draw() {
     const entry = entries[current];
     plot.hidden = !entry?.cloud;
-    const color = entry?.cloud && ([wanted, ...colors].find((each) => each && can(entry, each)));
+    const color = entry?.cloud && ([selectedColor, ...colors].find((each) => each && hasColor(entry, each)));
     for (const chip of document.querySelectorAll("[data-color]")) {
-      chip.hidden = !entries.some((each) => each.cloud && can(each, chip.dataset.color));
+      chip.hidden = !entries.some((each) => each.cloud && hasColor(each, chip.dataset.color));
       chip.setAttribute("aria-pressed", String(chip.dataset.color === color));
     }
     element("note").textContent = color ? NOTES[color] : "";
     if (!color) return;
     const layout = clouds.layout();
-    layout.uirevision = layout.scene.uirevision = "stay"; // the eye stays where the user put it
+    layout.uirevision = layout.scene.uirevision = "keep"; // keep the view that the user chose
     clouds.plotly().react(plot, traces(entry, color), layout, clouds.config);
   }
 
-  function tell(entry) {
-    const { answer } = entry;
+  function describe(entry) {
+    const { prediction } = entry;
     element("name").textContent = document.title = entry.name;
     const state = element("state");
-    state.replaceChildren(dot(answer?.state), said(entry));
+    state.replaceChildren(dot(prediction?.state), result(entry));
     if (entry.truth) {
-      state.append(make("span", { className: isWrong(entry) ? "badge warn" : "badge" }, `truth: ${words(entry.truth)}`));
+      state.append(make("span", { className: isWrong(entry) ? "badge warn" : "badge" }, `truth: ${stateName(entry.truth)}`));
     }
-    element("probabilities").replaceChildren(...(answer?.state ? data.states : []).flatMap(
+    element("probabilities").replaceChildren(...(prediction?.state ? data.states : []).flatMap(
       (name) => {
-        const p = answer.probabilities[name];
+        const p = prediction.probabilities[name];
         const filled = tinted(make("i"), name);
         filled.style.width = `${100 * p}%`;
-        return [make("dt", {}, words(name)), make("dd", { className: "bar" }, filled),
+        return [make("dt", {}, stateName(name)), make("dd", { className: "bar" }, filled),
           make("dd", { className: "number" }, `${(100 * p).toFixed(1)} %`)];
       }));
-    element("reason").textContent = entry.error || answer?.reason || "";
-    element("facts").textContent = answer ? [
-      answer.opening_angle_deg === undefined ? "" : `opened ${answer.opening_angle_deg.toFixed(0)}°`,
-      `${answer.points.toLocaleString("en")} points`, `${answer.milliseconds.toFixed(0)} ms`,
+    element("reason").textContent = entry.error || prediction?.reason || "";
+    element("facts").textContent = prediction ? [
+      prediction.opening_angle_deg === undefined ? "" : `opened ${prediction.opening_angle_deg.toFixed(0)}°`,
+      `${prediction.points.toLocaleString("en")} points`, `${prediction.milliseconds.toFixed(0)} ms`,
     ].filter(Boolean).join(", ") : "";
   }
 
@@ -83,18 +83,18 @@
     current = index;
     const chosen = list.children[current].firstChild;
     chosen.setAttribute("aria-current", "true");
-    const top = chosen.offsetTop - list.offsetTop; // the list is scrolled, and never the page
+    const top = chosen.offsetTop - list.offsetTop; // scroll the list, never the page
     if (top < list.scrollTop || top + chosen.offsetHeight > list.scrollTop + list.clientHeight) {
       list.scrollTop = top - list.clientHeight / 2;
     }
     place();
-    tell(entries[current]);
+    describe(entries[current]);
     if (!data.live) history.replaceState(null, "", `#${current + 1}`);
     draw();
   }
 
   function place() {
-    element("place").textContent = entries.length ? `${forgotten + current + 1} / ${forgotten + entries.length}` : "";
+    element("place").textContent = entries.length ? `${dropped + current + 1} / ${dropped + entries.length}` : "";
     element("previous").disabled = current <= 0;
     element("next").disabled = current >= entries.length - 1;
   }
@@ -102,7 +102,7 @@
   // ---- all clouds ------------------------------------------------------------------------------------------
   function add(entry) {
     entries.push(entry);
-    const state = make("span", { className: isWrong(entry) || entry.error ? "wrong" : "" }, dot(entry.answer?.state), said(entry));
+    const state = make("span", { className: isWrong(entry) || entry.error ? "wrong" : "" }, dot(entry.prediction?.state), result(entry));
     list.append(make("li", {}, make("button", { type: "button" }, make("b", {}, entry.name), state)));
   }
 
@@ -110,7 +110,7 @@
     setFollow(false);
     show(current + by);
   };
-  const setFollow = (on) => follow?.setAttribute("aria-pressed", String(on));
+  const setFollow = (isOn) => follow?.setAttribute("aria-pressed", String(isOn));
   const isFollowing = () => follow?.getAttribute("aria-pressed") === "true";
 
   element("previous").addEventListener("click", () => step(-1));
@@ -133,7 +133,7 @@
   document.querySelector(".chips").addEventListener("click", (event) => {
     const { color } = event.target.closest("button")?.dataset ?? {};
     if (!color) return;
-    wanted = color;
+    selectedColor = color;
     draw();
   });
   dark.addEventListener("change", draw);
@@ -148,16 +148,16 @@
   place();
   draw();
 
-  function arrived(event) {
+  function receive(event) {
     add(JSON.parse(event.data));
-    if (entries.length > MOST && current !== 0) {
+    if (entries.length > MAX_ENTRIES && current !== 0) {
       entries.shift();
       list.firstChild.remove();
-      [current, forgotten] = [current - 1, forgotten + 1];
+      [current, dropped] = [current - 1, dropped + 1];
     }
     place();
     if (isDue || !(isFollowing() || current < 0)) return;
-    isDue = true; // several that arrive between two pictures are drawn as one, the last
+    isDue = true; // of several clouds within one frame only the last is drawn
     requestAnimationFrame(() => {
       isDue = false;
       show(entries.length - 1);
@@ -168,6 +168,6 @@
   const source = new EventSource("events");
   source.addEventListener("open", () => { badge.textContent = "live"; });
   source.addEventListener("error", () => { badge.textContent = "not connected"; });
-  source.addEventListener("cloud", arrived);
+  source.addEventListener("cloud", receive);
   source.addEventListener("end", () => { badge.textContent = "ended"; source.close(); });
 })();

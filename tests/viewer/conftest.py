@@ -1,9 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the tests of the view show: one door in three states, one behind glass, and a file that is broken."""
+"""Clouds of the page tests: one door in three states, one behind glass, and one that cannot be read."""
 
 from __future__ import annotations
-
-from typing import Any
 
 import numpy as np
 import pytest
@@ -16,16 +14,15 @@ from doorstate.networks.weights import WeightsCard
 from doorstate.simulation.frames import Frame, replay
 from doorstate.simulation.generate import PRESETS, draw_pose
 from doorstate.types import STATES
-from doorstate.viewer.cloud_page import look
+from doorstate.viewer.cloud_page import Entry, make_entry
 from doorstate.viewer.named_clouds import NamedCloud
 
 POINTS = 300
-Entry = dict[str, Any]
 
 
 @pytest.fixture(scope="module")
-def viewer() -> Predictor:
-    """An untrained PointNet: quick, and any answer will do."""
+def predictor() -> Predictor:
+    """Untrained PointNet, because it is quick."""
     torch.manual_seed(0)
     card = WeightsCard(network="pointnet", num_points=POINTS)
     return Predictor(create_network("pointnet"), card, POINTS)
@@ -33,27 +30,27 @@ def viewer() -> Predictor:
 
 @pytest.fixture(scope="module")
 def frames() -> list[Frame]:
-    """A closed, a semi-open and an open door from one place."""
+    """A closed, a semi-open and an open door from one pose."""
     return [replay(row) for row in draw_pose(PRESETS["ogurob"], 3, 700)]
 
 
 @pytest.fixture(scope="module")
-def sightings(frames: list[Frame]) -> list[NamedCloud]:
-    """Two with all that can be known, one from a file, one behind glass, one that could not be read."""
+def clouds(frames: list[Frame]) -> list[NamedCloud]:
+    """Two clouds with parts and truth, one without, one behind glass, and an error."""
     glass = frames[0].points.copy()
     glass[:, 200:440] = np.nan
-    known = [
+    simulated = [
         NamedCloud(f"{state} door", frame.points, frame.cut.part.reshape(-1), state)
         for state, frame in zip(STATES[:2], frames[:2], strict=True)
     ]
     return [
-        *known,
+        *simulated,
         NamedCloud("open/file.pcd", frames[2].points),
         NamedCloud("glass.png", glass),
-        NamedCloud("broken.pcd", CloudReadError("broken.pcd: is no PCD file")),
+        NamedCloud("broken.pcd", CloudReadError("not a PCD file", path="broken.pcd")),
     ]
 
 
 @pytest.fixture(scope="module")
-def entries(viewer: Predictor, sightings: list[NamedCloud]) -> list[Entry]:
-    return [look(viewer, sighting) for sighting in sightings]
+def entries(predictor: Predictor, clouds: list[NamedCloud]) -> list[Entry]:
+    return [make_entry(predictor, cloud) for cloud in clouds]

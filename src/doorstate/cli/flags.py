@@ -1,0 +1,21 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Python parameters as flags of the command line, for error messages."""
+
+from __future__ import annotations
+
+# Flags that are not spelled like the parameter of the library function they are passed to.
+_FLAGS = {
+    "roll_deg": "--roll",
+    "depth_scale_m": "--depth-scale",
+    "units_m": "--units",
+    "num_points": "--points",
+    "raw": "--keep",
+    "recipe_changes": "--set",
+    "dataset": "--data",
+}
+
+
+def format_flag(name: str, value: object = None) -> str:
+    """Return a parameter as a user types it, such as `--points 128`; without a value only the flag."""
+    flag = _FLAGS.get(name, f"--{name.replace('_', '-')}")
+    return flag if value is None else f"{flag} {value}"

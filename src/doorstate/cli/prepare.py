@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`doorstate prepare`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from doorstate.cli.options import (
+    DepthScale,
+    Focal,
+    Frame,
+    IntrinsicsFile,
+    LayoutName,
+    MaxDepth,
+    PreparedPoints,
+    Roll,
+    ShardOption,
+    Thin,
+    Units,
+    Workers,
+    read_options,
+)
+from doorstate.errors import ConfigError
+
+if TYPE_CHECKING:
+    from doorstate.dataset.prepare import PreparationSummary
+
+_MAX_LISTED = 10  # rejected clouds
+
+
+def prepare(
+    source: Annotated[
+        Path, typer.Argument(help="Simulated folder, or folder with one sub-folder of clouds for each state.")
+    ],
+    out: Annotated[Path, typer.Option(help="Folder to create, or to continue.")],
+    points: PreparedPoints = 4096,
+    poses: Annotated[
+        Path | None,
+        typer.Option(
+            help="CSV file with the poses of clouds in state folders: file,x_m,y_m or file,distance_m,robot_angle_deg."
+        ),
+    ] = None,
+    frame: Frame = "body",
+    roll: Roll = 0,
+    units: Units = "m",
+    depth_scale: DepthScale = 0.001,
+    intrinsics: IntrinsicsFile = None,
+    fx: Focal = None,
+    fy: Focal = None,
+    cx: Focal = None,
+    cy: Focal = None,
+    workers: Workers = None,
+    shard: ShardOption = None,
+    layout: LayoutName = None,
+    max_depth: MaxDepth = None,
+    thin: Thin = False,
+) -> None:
+    """Clean clouds and sort them by farthest-point sampling, ready for training.
+
+    \b
+    Examples:
+      doorstate prepare data/ogurob --out data/ogurob-4096
+      doorstate prepare data/varied --thin --max-depth-m 5 --out data/varied-4096
+      doorstate prepare data/varied --shard 2/8 --out data/varied-4096
+      doorstate prepare DeepDoors2 --layout deepdoors2 --out data/deepdoors2
+      doorstate prepare ~/OGUROB_DOORS --poses poses.csv --frame optical --out data/original
+    """
+    from doorstate._jobs import Shard
+    from doorstate.cli.console import progress_bar, stdout
+    from doorstate.clouds.preparation import CloudSpec
+    from doorstate.dataset.prepare import Preparation, prepare_dataset, prepare_shard
+
+    options = read_options(frame, roll, units, depth_scale, intrinsics, (fx, fy, cx, cy), layout)
+    if layout is not None and poses is not None:
+        raise ConfigError("--poses cannot be combined with --layout")
+    spec = CloudSpec(num_points=points, thin=thin, max_depth_m=max_depth)
+    preparation = Preparation(source, spec, poses, options, layout)
+    if shard is not None:
+        part = Shard.parse(shard)
+        with progress_bar("Preparing") as progress:
+            prepare_shard(preparation, out, part, workers, progress)
+        stdout.print(f"shard {shard} is in {out}; run the command without --shard to join all shards")
+        return
+    with progress_bar("Preparing") as progress:
+        summary = prepare_dataset(preparation, out, workers, progress)
+    print_summary(summary, out, points)
+
+
+def print_summary(summary: PreparationSummary, out: Path, points: int) -> None:
+    """Print the number of prepared clouds; exit with code 1 if clouds were rejected."""
+    from doorstate.cli.console import stderr, stdout
+    from doorstate.types import NO_DOOR, STATES
+
+    for row in summary.rejected[:_MAX_LISTED]:
+        stderr.print(f"rejected {row['file'] or row['sample_id']}: {row['reason']}")
+    if summary.rejected:
+        stderr.print(f"{len(summary.rejected)} clouds rejected; all are listed in {out / 'rejected.csv'}")
+    names = (*STATES, NO_DOOR)
+    counts = {name: int((summary.dataset.labels == label).sum()) for label, name in enumerate(names)}
+    for state in STATES:
+        if not counts[state] and summary.dataset.description.kind == "imported":
+            stderr.print(f"no clouds of state {state}: check the name of its folder")
+    by_state = ", ".join(f"{count} {name}" for name, count in counts.items() if count or name != NO_DOOR)
+    stdout.print(f"{len(summary.dataset)} clouds of {points} points in {out} ({by_state})", soft_wrap=True)
+    if summary.rejected:
+        raise typer.Exit(1)

@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`doorstate report`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from doorstate.errors import DatasetError
+
+
+def report(
+    folders: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="FOLDER...", help="Comparisons of the same samples, or one prepared data set."
+        ),
+    ],
+    out: Annotated[
+        Path | None, typer.Option(help="Folder to write to. [default: report in the first FOLDER]")
+    ] = None,
+    data: Annotated[Path | None, typer.Option(help="Data set of the comparisons, if it was moved.")] = None,
+) -> None:
+    """Write tables, figures and a self-contained HTML page of comparisons, or of one data set.
+
+    \b
+    Examples:
+      doorstate report runs/one-fold
+      doorstate report runs/paper runs/related --out reports/all
+      doorstate report data/ogurob-4096 --out reports/data
+    """
+    from doorstate.cli.console import stderr, stdout
+    from doorstate.dataset.store import is_prepared
+    from doorstate.evaluation.report import write_dataset_figures, write_report
+
+    is_dataset = len(folders) == 1 and not (folders[0] / "comparison.json").is_file()
+    if is_dataset and not is_prepared(folders[0]):
+        raise DatasetError("neither a comparison nor a prepared data set", path=folders[0])
+    target = out or folders[0] / "report"
+    with stderr.status("Writing the report"):
+        page = (
+            write_dataset_figures(folders[0], target) if is_dataset else write_report(folders, target, data)
+        )
+    stdout.print(f"report: {page}", soft_wrap=True)

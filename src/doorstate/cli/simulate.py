@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`doorstate simulate`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from doorstate.cli.options import MaxDepth, PreparedPoints, ShardOption, Thin, Workers
+from doorstate.errors import ConfigError
+
+
+def simulate(
+    out: Annotated[Path, typer.Option(help="Folder to create, or to continue.")],
+    preset: Annotated[
+        str,
+        typer.Option(
+            help="One door seen from many poses: ogurob, ogurob-fixed, ogurob-away. Many scenes: varied, "
+            "varied-angles, cluttered, no-door."
+        ),
+    ] = "ogurob",
+    poses: Annotated[
+        int | None, typer.Option(help="Number of robot poses of the ogurob presets. [default: all 1353]")
+    ] = None,
+    scenes: Annotated[
+        int | None, typer.Option(help="Number of scenes of the other presets. [default: 1000]", min=1)
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Seed of all random numbers.", min=0)] = 0,
+    sensor: Annotated[
+        str,
+        typer.Option(
+            help="Noise model of the depth camera: none, gaussian, gaussian:METRES, xtion, kinect, d435 or deepdoors2."
+        ),
+    ] = "none",
+    keep: Annotated[
+        list[str] | None, typer.Option(help="Raw files to write: pcd, depth or image; repeatable.")
+    ] = None,
+    workers: Workers = None,
+    shard: ShardOption = None,
+    prepared: Annotated[
+        Path | None,
+        typer.Option(help="Folder for prepared clouds, as written by doorstate prepare."),
+    ] = None,
+    points: PreparedPoints = 4096,
+    max_depth: MaxDepth = None,
+    thin: Thin = False,
+) -> None:
+    """Simulate doors seen by a depth camera.
+
+    The folder gets a manifest with one row for each cloud; every cloud can be rebuilt from its row. An interrupted
+    simulation continues where it stopped.
+
+    \b
+    Examples:
+      doorstate simulate --out data/ogurob
+      doorstate simulate --out data/small --poses 60 --keep pcd --keep image
+      doorstate simulate --preset varied --scenes 10000 --out data/varied
+      doorstate simulate --preset varied --scenes 10000 --sensor xtion --out data/varied-xtion
+      doorstate simulate --preset cluttered --scenes 40000 --shard 2/8 --out data/cluttered
+      doorstate simulate --preset varied --sensor d435 --out data/d435 --prepared data/d435-4096 --thin --max-depth-m 5
+    """
+    from doorstate._jobs import Shard
+    from doorstate.cli.console import progress_bar, stderr, stdout
+    from doorstate.cli.prepare import print_summary
+    from doorstate.clouds.preparation import CloudSpec
+    from doorstate.dataset.prepare import Preparation
+    from doorstate.dataset.simulated import Sampler, simulate_prepared
+    from doorstate.simulation.run import simulate_dataset, simulate_shard
+    from doorstate.simulation.settings import RAW_KINDS, settings_for
+
+    unknown = [kind for kind in keep or [] if kind not in RAW_KINDS]
+    if unknown:
+        raise ConfigError(f"--keep {unknown[0]}: expected one of {', '.join(RAW_KINDS)}")
+    kinds: Any = tuple(kind for kind in RAW_KINDS if kind in (keep or []))
+    settings = settings_for(preset, seed, poses, scenes, kinds, sensor)
+    preparation = Preparation(out, CloudSpec(num_points=points, thin=thin, max_depth_m=max_depth))
+    if prepared is None and preparation != Preparation(out):
+        raise ConfigError("--points, --max-depth-m and --thin need --prepared")
+    if shard is not None:
+        part = Shard.parse(shard)
+        with progress_bar("Simulating") as progress:
+            simulate_shard(out, settings, part, workers, progress, Sampler(preparation) if prepared else None)
+        stdout.print(f"shard {shard} is in {out}; run the command without --shard to join all shards")
+        return
+    with progress_bar("Simulating") as progress:
+        if prepared is not None:
+            summary = simulate_prepared(settings, preparation, prepared, workers, progress)
+        rows = simulate_dataset(out, settings, workers, progress)
+    _print_counts(rows)
+    twins = sum(bool(row["same_image_as"]) for row in rows)
+    if twins:
+        stderr.print(f"{twins} frames have the same image in another state (column same_image_as)")
+    if prepared is None:
+        stdout.print(f"{len(rows)} samples in {out}; next: doorstate prepare {out} --out {out}-4096")
+        return
+    stdout.print(f"{len(rows)} samples in {out}")
+    print_summary(summary, prepared, points)
+
+
+def _print_counts(rows: list[dict[str, str]]) -> None:
+    """Print the number of clouds by distance and region, as in Table 1 of the paper."""
+    from doorstate.cli.console import print_table
+    from doorstate.dataset.strata import BANDS, REGIONS, distance_band, region
+
+    counts = [
+        (distance_band(float(row["distance_m"])), region(float(row["robot_angle_deg"]))) for row in rows
+    ]
+    print_table(
+        "Clouds by distance (m) and region",
+        ["distance", *REGIONS, "all"],
+        [
+            [
+                band,
+                *(str(counts.count((band, name))) for name in REGIONS),
+                str(sum(row_band == band for row_band, _ in counts)),
+            ]
+            for band in BANDS
+        ],
+    )

@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: Apache-2.0
+"""ASGI application: POST a cloud file, get its prediction as JSON."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from typing import Annotated, Any
+
+from fastapi import FastAPI, Query, Request
+from fastapi.responses import PlainTextResponse
+
+from doorstate import __version__
+from doorstate.inference.predictor import Predictor
+from doorstate.inference.rule_predictor import RulePredictor
+from doorstate.inference.serialization import prediction_to_dict, require_points
+from doorstate.io.readers import parse_cloud
+from doorstate.serving.errors import STATUS_DESCRIPTIONS, add_error_handlers
+from doorstate.serving.lingering_close import LingeringClose
+from doorstate.serving.models import ErrorResponse, HealthResponse, PredictionResponse
+from doorstate.serving.request import PredictQuery
+from doorstate.serving.work_queue import Limits, WorkQueue
+
+_FILE = {"schema": {"type": "string", "format": "binary"}}
+_REQUEST_BODY = {
+    "required": True,
+    "description": "Content of the file.",
+    "content": {"application/octet-stream": _FILE, "image/png": _FILE, "text/csv": _FILE},
+}
+_WELCOME = f"""doorstate {__version__}: the state of a door from one depth-camera point cloud.
+
+POST /predict?format=pcd  predict the state; the body of the request is the file
+GET  /health              state of the service, and the network or rule it uses
+GET  /openapi.json        description of the interface (OpenAPI)
+GET  /docs                the same as a page, which loads scripts from a public server
+"""
+
+
+def create_app(predictor: Predictor | RulePredictor, limits: Limits | None = None) -> FastAPI:
+    """Return the service as an ASGI application.
+
+    Args:
+        predictor: predicts the files. It is called from `limits.workers` threads, so torch should use no more threads
+            of its own than there are processors left for each.
+        limits: limits of the service; None for the defaults.
+    """
+    queue = WorkQueue(limits or Limits())
+
+    @asynccontextmanager
+    async def lifespan(_: FastAPI) -> AsyncIterator[None]:
+        yield
+        queue.close()
+
+    app = FastAPI(
+        title="doorstate",
+        description="The state of a door from one depth-camera point cloud.",
+        version=__version__,
+        lifespan=lifespan,
+        redoc_url=None,
+    )
+    app.add_middleware(LingeringClose)
+    add_error_handlers(app)
+
+    @app.get("/", response_class=PlainTextResponse, include_in_schema=False)
+    async def welcome() -> str:
+        return _WELCOME
+
+    @app.get("/health", summary="State of the service", response_model_exclude_none=True)
+    async def health() -> HealthResponse:
+        if isinstance(predictor, RulePredictor):
+            return HealthResponse(ready=True, version=__version__, rule=predictor.rule.name)
+        return HealthResponse(
+            ready=True, version=__version__, network=predictor.card.network, points=predictor.points
+        )
+
+    @app.post(
+        "/predict",
+        summary="Predict the state of the door in a file",
+        response_model=PredictionResponse,
+        response_model_exclude_unset=True,
+        responses={
+            status: {"description": description, "model": ErrorResponse}
+            for status, description in STATUS_DESCRIPTIONS.items()
+        },
+        openapi_extra={"requestBody": _REQUEST_BODY},
+    )
+    async def predict(request: Request, query: Annotated[PredictQuery, Query()]) -> dict[str, Any]:
+        options, suffix = query.read_options(), query.suffix(request.headers.get("content-type", ""))
+
+        def predict_file(content: bytes) -> dict[str, Any]:
+            return prediction_to_dict(require_points(predictor(parse_cloud(content, suffix, options))))
+
+        return await queue.run(request, predict_file)
+
+    return app

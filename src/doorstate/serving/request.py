@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Query parameters of a prediction request."""
+
+from __future__ import annotations
+
+from pathlib import PurePath
+
+from fastapi import HTTPException
+from pydantic import BaseModel, ConfigDict, Field
+
+from doorstate.io.depth import ROLLS_DEG
+from doorstate.io.readers import CLOUD_SUFFIXES, UNITS_M, ReadOptions, options_from_flags
+
+_FORMATS = [suffix.lstrip(".") for suffix in CLOUD_SUFFIXES]
+_FORMAT_OF_SUBTYPE = {"plain": "txt"}  # media subtypes that differ from the suffix
+# Parameters that are not spelled like the parameter of the library function they are passed to.
+_NAMES = {"roll_deg": "roll", "depth_scale_m": "depth_scale", "units_m": "units"}
+
+
+class PredictQuery(BaseModel):
+    """Query parameters, as the options of `doorstate predict`."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    format: str | None = Field(
+        None,
+        description="Format of the file. If it is missing, `filename` or the Content-Type gives the format.",
+        json_schema_extra={"enum": [*_FORMATS]},
+    )
+    filename: str | None = Field(None, description="File name; its suffix gives the format.")
+    frame: str = Field(
+        "body",
+        description="Axes of clouds: body (x forward, y left, z up) or optical (z forward, y down).",
+        json_schema_extra={"enum": ["body", "optical"]},
+    )
+    roll: int = Field(
+        0,
+        description="Clockwise rotation of the camera, seen from behind, in degrees.",
+        json_schema_extra={"enum": list(ROLLS_DEG)},
+    )
+    units: str = Field(
+        "m",
+        description="Length unit of clouds and of floating point depth images.",
+        json_schema_extra={"enum": list(UNITS_M)},
+    )
+    depth_scale: float = Field(0.001, description="Metres per unit of integer depth images.")
+    fx: float | None = Field(None, description="Horizontal focal length of depth images in pixels.")
+    fy: float | None = Field(None, description="Vertical focal length in pixels.")
+    cx: float | None = Field(None, description="Horizontal image centre in pixels.")
+    cy: float | None = Field(None, description="Vertical image centre in pixels.")
+
+    def read_options(self) -> ReadOptions:
+        """Return how the file is read.
+
+        Raises:
+            ConfigError: a parameter has no such value.
+            CameraError: the camera is impossible.
+        """
+        camera = (self.fx, self.fy, self.cx, self.cy)
+        return options_from_flags(self.frame, self.roll, self.units, self.depth_scale, None, camera)
+
+    def suffix(self, content_type: str) -> str:
+        """Return the suffix of the file: from `format`, or else from `filename`, or else from the Content-Type.
+
+        Raises:
+            HTTPException: 415, not a format that can be read.
+        """
+        if self.format is not None:
+            name = self.format.lower().lstrip(".")
+        elif self.filename is not None:
+            name = PurePath(self.filename).suffix.lower().lstrip(".")
+        else:
+            subtype = content_type.partition(";")[0].rpartition("/")[2].strip().lower().removeprefix("x-")
+            name = _FORMAT_OF_SUBTYPE.get(subtype, subtype)
+        if name not in _FORMATS:
+            raise HTTPException(
+                415, f"unknown file format: give the parameter format, one of {', '.join(_FORMATS)}"
+            )
+        return f".{name}"
+
+
+def format_parameter(name: str, value: object = None) -> str:
+    """Return a library parameter as a query parameter, such as `units=mm`; without a value only its name."""
+    name = _NAMES.get(name, name)
+    return name if value is None else f"{name}={value}"
