@@ -18,7 +18,7 @@ from doorstate.rules.base import Detection
 from doorstate.types import NO_DOOR, STATES
 
 PROBABILITY_COLUMNS = tuple(f"p_{state}" for state in STATES)
-TEXT_COLUMNS = ("method", "role", "sample_id", "state", "predicted", "reason", "open_or_not")
+TEXT_COLUMNS = ("part", "method", "role", "sample_id", "state", "predicted", "reason", "open_or_not")
 KEY_COLUMNS = ("method", "fold", "role", "sample_id", "state", "predicted", *PROBABILITY_COLUMNS)
 RULE_COLUMNS = ("reason", "opening_angle_deg", "open_or_not")
 """Columns of every table of predictions; those of heads follow where a method has them."""

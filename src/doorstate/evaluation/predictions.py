@@ -16,16 +16,22 @@ from doorstate.dataset.store import manifest_path
 from doorstate.errors import DatasetError, RunError, first_validation_error
 from doorstate.evaluation import comparison_folder, published
 from doorstate.evaluation.checks import check_predictions
-from doorstate.evaluation.comparison import KEY_COLUMNS, RULE_COLUMNS, TEXT_COLUMNS, ComparisonConfig, Results
+from doorstate.evaluation.comparison import (
+    KEY_COLUMNS,
+    RULE_COLUMNS,
+    TEXT_COLUMNS,
+    ComparisonConfig,
+    Results,
+    RunRecord,
+)
 from doorstate.evaluation.manifest import read_manifest
 from doorstate.evaluation.published import save_results
 from doorstate.rules.base import Detection
 from doorstate.training.run_folder import read_json, run_of
 
-__all__ = ["Results", "is_comparison", "join_results", "load_results", "save_results"]
+__all__ = ["Results", "is_comparison", "join_results", "load_part", "load_results", "save_results"]
 
 _DATASETS = "datasets"  # beside published comparisons: manifests of their data sets
-_DEPTH = 3  # folders between a published comparison and `datasets`, of a study's parts the most
 
 
 def is_comparison(folder: Path) -> bool:
@@ -117,8 +123,7 @@ def _read_config(path: Path) -> ComparisonConfig:
 
 
 def _find_dataset(folder: Path, dataset: str, is_published: bool) -> Path:
-    ancestors = folder.absolute().parents[:_DEPTH] if is_published else ()
-    beside = [ancestor / _DATASETS / Path(dataset).name for ancestor in ancestors]
+    beside = [folder.absolute().parent / _DATASETS / Path(dataset).name] if is_published else []
     for candidate in (*beside, Path(dataset), folder / dataset):
         try:
             return manifest_path(candidate).parent
@@ -155,12 +160,49 @@ def _load_runs(
     return results
 
 
+def load_part(
+    folder: Path,
+    config: Mapping[str, Any],
+    splits: Sequence[Mapping[str, Role]],
+    predictions: pd.DataFrame,
+    runs: Sequence[RunRecord],
+) -> Results:
+    """Check and return one comparison of a published study.
+
+    Args:
+        folder: published study.
+        config: configuration of the comparison.
+        splits: by fold, role of every sample.
+        predictions: rows of this comparison.
+        runs: its runs.
+
+    Raises:
+        RunError: the parts do not fit.
+    """
+    try:
+        checked = ComparisonConfig.model_validate(config)
+    except ValidationError as error:
+        raise RunError(first_validation_error(error), path=folder) from error
+    dataset_folder = _find_dataset(folder, checked.dataset, True)
+    return _checked(checked, dataset_folder, tuple(splits), predictions, runs, folder / published.PREDICTIONS)
+
+
 def _load_published(
     folder: Path, config: ComparisonConfig, dataset_folder: Path, splits: tuple[Mapping[str, Role], ...]
 ) -> Results:
     path = folder / published.PREDICTIONS
-    predictions = published.read_predictions(path)
     runs = published.read_records(folder / published.METRICS)
+    return _checked(config, dataset_folder, splits, published.read_predictions(path), runs, path)
+
+
+def _checked(
+    config: ComparisonConfig,
+    dataset_folder: Path,
+    splits: tuple[Mapping[str, Role], ...],
+    predictions: pd.DataFrame,
+    runs: Sequence[RunRecord],
+    path: Path,
+) -> Results:
     results = Results(
         config,
         dataset_folder,

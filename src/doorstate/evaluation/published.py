@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import zlib
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -33,12 +34,15 @@ def save_results(results: Results, folder: Path) -> None:
     """
     document = results.config.model_dump(mode="json")
     write_text(folder / EXPERIMENT, json.dumps(document, indent=1) + "\n")
-    runs = ",\n".join(json.dumps(_encode_run(run)) for run in results.runs)
-    write_text(folder / METRICS, f'{{"runs": [\n{runs}\n]}}\n')
+    write_text(folder / METRICS, f'{{"runs": {encode_runs(results.runs)}}}\n')
     write_splits(folder / SPLITS, [dict(roles) for roles in results.splits])
+    write_predictions(results.predictions, folder / PREDICTIONS)
+
+
+def write_predictions(predictions: pd.DataFrame, path: Path) -> None:
+    """Write a table of predictions, compressed; the same table gives the same bytes."""
     # 15 digits are more than any of these numbers has, and read back as the same float64.
-    table = results.predictions.to_csv(index=False, lineterminator="\n", float_format="%.15g")
-    write_compressed_text(folder / PREDICTIONS, table)
+    write_compressed_text(path, predictions.to_csv(index=False, lineterminator="\n", float_format="%.15g"))
 
 
 def read_predictions(path: Path) -> pd.DataFrame:
@@ -73,18 +77,32 @@ def read_records(path: Path) -> list[RunRecord]:
         RunError: the file is missing or damaged.
     """
     try:
-        return [
-            RunRecord(
-                run["method"],
-                int(run["fold"]),
-                run["metrics"],
-                run["environment"],
-                pd.DataFrame(run["log"], dtype="float64"),
-            )
-            for run in read_json(path)["runs"]
-        ]
+        return decode_runs(read_json(path)["runs"])
     except (KeyError, TypeError, ValueError) as error:
         raise RunError(f"holds no list of runs ({error!r})", path=path) from error
+
+
+def encode_runs(runs: Iterable[RunRecord]) -> str:
+    """Return records of runs as JSON, one run a line."""
+    return "[\n" + ",\n".join(json.dumps(_encode_run(run)) for run in runs) + "\n]"
+
+
+def decode_runs(runs: Iterable[Mapping[str, Any]]) -> list[RunRecord]:
+    """Return records of runs from what `encode_runs` wrote.
+
+    Raises:
+        KeyError, TypeError, ValueError: it is something else.
+    """
+    return [
+        RunRecord(
+            run["method"],
+            int(run["fold"]),
+            run["metrics"],
+            run["environment"],
+            pd.DataFrame(run["log"], dtype="float64"),
+        )
+        for run in runs
+    ]
 
 
 def _encode_run(run: RunRecord) -> dict[str, Any]:
