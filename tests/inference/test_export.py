@@ -20,7 +20,8 @@ from doorstate.inference.torch_backend import TorchBackend
 from doorstate.networks import create_network, list_networks
 from doorstate.networks.base import PointNetwork
 from doorstate.networks.card import WeightsCard
-from doorstate.networks.heads import HEADS, add_heads
+from doorstate.networks.head_layers import add_heads
+from doorstate.networks.heads import HEADS
 from doorstate.networks.layers import set_batchnorm
 
 SLOW = {"pointcnn"}

@@ -20,8 +20,8 @@ from doorstate.inference.predictor import Predictor
 from doorstate.inference.rule_predictor import RulePredictor
 from doorstate.networks import create_network
 from doorstate.networks.base import PointNetwork
-from doorstate.networks.decoding import in_metres
-from doorstate.networks.heads import HEADS, add_heads, answers
+from doorstate.networks.head_layers import add_heads, head_outputs
+from doorstate.networks.heads import HEADS, head_columns
 from doorstate.networks.packaged import packaged_networks, packaged_weights
 from doorstate.networks.weights import WeightsCard, save_weights
 from doorstate.simulation.frames import replay
@@ -267,8 +267,8 @@ def test_heads_answer_in_metres_beside_the_state(headed: Path, small_dataset: Pr
     assert isinstance(predictor.network, PointNetwork)
     prepared = prepare_cloud(cloud, CloudSpec(num_points=160, thin=True)).points[None]
     with torch.no_grad():
-        said = answers(predictor.network, torch.from_numpy(normalize(prepared)))
-    columns = in_metres(
+        said = head_outputs(predictor.network, torch.from_numpy(normalize(prepared)))
+    columns = head_columns(
         {name: said[name].numpy() for name in HEADS},
         prepared.mean(axis=1, dtype=np.float64).astype(np.float32),
     )

@@ -80,7 +80,7 @@ def test_pretrained_network_has_packaged_weights_and_heads() -> None:
 
 def test_heavy_modules_are_imported_on_use() -> None:
     code = (
-        "import sys, doorstate.networks.card, doorstate.networks.decoding, doorstate.networks.packaged; "
+        "import sys, doorstate.networks.card, doorstate.networks.heads, doorstate.networks.packaged; "
         "sys.exit('torch' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -1,216 +1,237 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What networks say besides the state: shapes, losses worked by hand; a network without heads stays as it is."""
+"""Heads: targets, losses and metrics worked by hand; targets move with the points; columns invert targets."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 import pytest
 import torch
-from scipy.spatial import cKDTree
-from torch import Tensor
+from numpy.testing import assert_allclose
+from numpy.typing import NDArray
 
-from doorstate.errors import ConfigError
-from doorstate.networks import create_network, list_networks
-from doorstate.networks.base import PointNetwork
+from doorstate.clouds.augmentation import Augmentation, apply_augmentation, draw_augmentation
+from doorstate.clouds.preparation import SCALE_M
+from doorstate.dataset.store import PreparedDataset
 from doorstate.networks.heads import (
     HEADS,
-    FramePose,
-    Head,
-    HingeSide,
-    OpeningAngle,
-    Widths,
-    add_heads,
-    answers,
-    joint_losses,
+    POINT_HEADS,
+    augment_targets,
+    head_columns,
+    head_metrics,
+    head_targets,
 )
-from doorstate.networks.layers import JoinedDense
-from doorstate.networks.pointnet2 import interpolate
+from doorstate.simulation.generate import PRESETS, draw_pose
+from doorstate.simulation.manifest import flatten
 
-WITH_PARTS = ("pointnet", "pointnet2", "dgcnn")
-LABELS = torch.tensor([0, -100, 1])
+ROW = {
+    "state": "open",
+    "opening_angle_deg": "90.0",
+    "hinge": "left",
+    "door_x_m": "2.0",
+    "door_y_m": "0.5",
+    "door_yaw_deg": "90.0",  # x along the wall is the robot's left: the wall is straight ahead
+    "opening_width_m": "0.9",
+    "passable_width_m": "0.6",
+}
+WITHOUT_DOOR = {"sample_id": "a", "state": "no_door"}
 
 
-def clouds(num_points: int = 160) -> Tensor:
-    return torch.rand(3, num_points, 3, generator=torch.Generator().manual_seed(1)) * 2 - 1
-
-
-def targets(num_points: int = 160) -> dict[str, Tensor]:
-    """Of three clouds, the second without a door."""
-    nan = math.nan
-    return {
-        "door": torch.tensor([[1.0], [0.0], [1.0]]),
-        "angle": torch.tensor([[0.1], [nan], [1.2]]),
-        "hinge": torch.tensor([[1.0], [nan], [0.0]]),
-        "frame": torch.tensor([[0.2, -0.1, 3.0], [nan] * 3, [0.3, 0.0, -3.1]]),
-        "widths": torch.tensor([[0.3, 0.0], [nan] * 2, [0.31, 0.2]]),
-        "parts": torch.arange(3 * num_points).reshape(3, num_points) % 7 - 1,
+def test_targets_are_in_the_units_of_the_normalised_cloud() -> None:
+    centroids = np.array([[1.4, 0.2, 0.0], [0.0, 0.0, 0.0]], dtype=np.float32)
+    targets = head_targets([ROW, WITHOUT_DOOR], centroids)
+    assert {name: values.shape for name, values in targets.items()} == {
+        name: (2, head.num_values) for name, head in HEADS.items()
     }
-
-
-def headed(name: str) -> PointNetwork:
-    torch.manual_seed(0)
-    network = create_network(name)
-    add_heads(network, [*HEADS, *(["parts"] if name in WITH_PARTS else [])])
-    return network
-
-
-@pytest.mark.parametrize("name", list_networks())
-def test_every_network_takes_every_head(name: str) -> None:
-    network = headed(name).eval()
-    with torch.inference_mode():
-        found = answers(network, clouds())
-        logits = network(clouds())
-    assert {key: tuple(value.shape) for key, value in found.items() if key in HEADS} == {
-        "door": (3, 1),
-        "angle": (3, 1),
-        "hinge": (3, 1),
-        "frame": (3, 3),
-        "widths": (3, 2),
+    assert {name: head.num_values for name, head in HEADS.items()} == {
+        "door": 1,
+        "angle": 1,
+        "hinge": 1,
+        "frame": 3,
+        "widths": 2,
     }
-    assert torch.equal(found["state"], logits)
-    assert logits.shape == (3, 3)
-    assert all(value.isfinite().all() and value.dtype == torch.float32 for value in found.values())
-    if name in WITH_PARTS:
-        assert found["parts"].shape == (3, 160, 6)
+    assert targets["angle"][0, 0] == pytest.approx(math.pi / 2)
+    assert targets["hinge"][0, 0] == 1
+    assert_allclose(targets["frame"][0, :2], [0.6 / SCALE_M, 0.3 / SCALE_M], rtol=1e-6)
+    assert abs(targets["frame"][0, 2]) == pytest.approx(math.pi)  # the wall's normal points back at the robot
+    assert_allclose(targets["widths"][0] * SCALE_M, [0.9, 0.6], rtol=1e-6)
+    assert targets.pop("door").tolist() == [[1], [0]]
+    assert all(np.isnan(values[1]).all() for values in targets.values())
+    assert all(values.dtype == np.float32 for values in targets.values())
 
 
-@pytest.mark.parametrize("name", list_networks())
-def test_training_lowers_the_losses_and_reaches_every_parameter(name: str) -> None:
-    network = headed(name).train()
-    optimizer = torch.optim.Adam(network.parameters(), 3e-4)
-    totals = []
-    for _ in range(6):
-        torch.manual_seed(2)  # the same dropout every time
-        losses, _ = joint_losses(network, clouds(), LABELS, targets())
-        total = sum(losses.values(), torch.zeros(()))
-        totals.append(float(total.detach()))
-        optimizer.zero_grad()
-        total.backward()  # type: ignore[no-untyped-call]
-        assert all(p.grad is not None and p.grad.isfinite().all() for p in network.parameters())
-        optimizer.step()
-    assert set(losses) == {"state", *network.heads}
-    assert totals[-1] < 0.9 * totals[0]
+def test_only_the_named_heads_have_targets() -> None:
+    assert list(head_targets([ROW], np.zeros((1, 3), np.float32), ["widths", "parts"])) == ["widths"]
 
 
-@pytest.mark.parametrize("name", list_networks())
-def test_without_heads_the_parameters_are_those_of_the_paper(name: str) -> None:
-    torch.manual_seed(0)
-    plain = create_network(name)
-    with_heads = headed(name)
-    own = {key: value for key, value in with_heads.state_dict().items() if not key.startswith("heads.")}
-    assert list(own) == list(plain.state_dict())
-    assert all(torch.equal(own[key], value) for key, value in plain.state_dict().items())
+def test_rows_of_the_first_preset_have_all_but_the_passable_width() -> None:
+    row = flatten(draw_pose(PRESETS["ogurob"], 3, 700)[1])
+    targets = head_targets([row], np.zeros((1, 3), dtype=np.float32))
+    assert targets["hinge"][0, 0] == 1
+    assert targets["widths"][0, 0] * SCALE_M == pytest.approx(0.9)
+    assert np.isnan(targets["widths"][0, 1])
+    x, y, normal = targets["frame"][0]
+    assert math.hypot(x, y) * SCALE_M == pytest.approx(float(row["distance_m"]), rel=1e-6)
+    # The camera stands on the side that the normal points to.
+    assert -x * math.cos(normal) - y * math.sin(normal) > 0.2
 
 
-@pytest.mark.parametrize("name", WITH_PARTS)
-def test_parts_follow_their_points(name: str) -> None:
-    """Points after the centres in another order: each keeps its part."""
-    network = headed(name).double().eval()
-    points = clouds(700).double()
-    order = torch.cat(
-        [torch.arange(512), 512 + torch.randperm(188, generator=torch.Generator().manual_seed(3))]
-    )
-    with torch.inference_mode():
-        found, moved = (answers(network, cloud)["parts"] for cloud in (points, points[:, order]))
-    torch.testing.assert_close(moved, found[:, order], atol=1e-9, rtol=0)
-    assert found.std(dim=1).min() > 1e-6
+def _augmented(
+    **changes: object,
+) -> tuple[Mapping[str, NDArray[np.float32]], Mapping[str, NDArray[np.float32]], NDArray[np.float32]]:
+    """Targets before and after, and two points of each of 50 doors after: its middle, and one before it."""
+    rng = np.random.default_rng(5)
+    frame = np.column_stack([rng.uniform(-1, 1, (50, 2)), rng.uniform(-3, 3, 50)])
+    targets = {
+        "angle": rng.uniform(0, 2, (50, 1)),
+        "hinge": rng.integers(0, 2, (50, 1)).astype(float),
+        "frame": frame,
+        "widths": rng.uniform(0.1, 0.4, (50, 2)),
+    }
+    before = {name: values.astype(np.float32) for name, values in targets.items()}
+    normal = np.column_stack([np.cos(frame[:, 2]), np.sin(frame[:, 2])])
+    points = np.zeros((50, 2, 3))
+    points[:, 0, :2], points[:, 1, :2] = frame[:, :2], frame[:, :2] + normal
+    draw = draw_augmentation(Augmentation.model_validate(changes), rng, 50, 2)
+    moved = apply_augmentation(points.astype(np.float32), draw)
+    return before, augment_targets(before, draw), moved
 
 
-@pytest.mark.parametrize("name", WITH_PARTS)
-@pytest.mark.parametrize("count", [60, 400])
-def test_parts_of_the_first_points_are_those_of_all(name: str, count: int) -> None:
-    network = headed(name).double().eval()
-    points = clouds(700).double()
-    parts = torch.randint(-1, 6, (3, 700), generator=torch.Generator().manual_seed(5))
-    wanted = {key: value.double() for key, value in targets().items()} | {"parts": parts}
-    with torch.inference_mode():
-        every = answers(network, points)["parts"]
-        encoding = network.encode(points)
-        some = network.heads["parts"](points[:, :count], encoding)
-        losses, _ = joint_losses(network, points, LABELS, wanted, part_points=count)
-    torch.testing.assert_close(some, every[:, :count], atol=1e-9, rtol=0)
-    known = parts[:, :count] >= 0
-    expected = torch.nn.functional.cross_entropy(every[:, :count][known], parts[:, :count][known])
-    torch.testing.assert_close(losses["parts"], expected)
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"yaw_deg": 180.0},
+        {"mirror": 0.5},
+        {"scale": (0.5, 2.0)},
+        {"yaw_deg": 40.0, "mirror": 1.0, "shift": 0.3},
+    ],
+)
+def test_targets_move_with_the_points_of_the_door(changes: dict[str, object]) -> None:
+    before, after, moved = _augmented(**changes)
+    assert_allclose(after["frame"][:, :2], moved[:, 0, :2], atol=1e-5)
+    ahead = moved[:, 1, :2] - moved[:, 0, :2]
+    turn = np.arctan2(ahead[:, 1], ahead[:, 0]) - after["frame"][:, 2]
+    assert_allclose(np.cos(turn), 1, atol=1e-6)
+    assert_allclose(after["angle"], before["angle"])
+    scale = np.linalg.norm(ahead, axis=1)
+    assert_allclose(after["widths"], before["widths"] * scale[:, None], rtol=1e-4)
 
 
-def test_unknown_targets_cost_nothing() -> None:
-    network = headed("pointnet2").train()
-    unknown = {key: torch.full_like(value, math.nan) for key, value in targets().items() if key in HEADS}
-    unknown["parts"] = torch.full((3, 160), -1)
-    losses, _ = joint_losses(network, clouds(), torch.full((3,), -100), unknown)
-    assert float(losses["state"].detach()) == 0
-    assert all(float(losses[key].detach()) == 0 for key in unknown)
-    sum(losses.values(), torch.zeros(())).backward()  # type: ignore[no-untyped-call]
-    assert not any(p.grad is not None and p.grad.any() for p in network.heads.parameters())
+def test_a_mirrored_door_is_hinged_on_the_other_side() -> None:
+    before, after, _ = _augmented(mirror=1.0, yaw_deg=100.0)
+    assert_allclose(after["hinge"], 1 - before["hinge"])
+    before, after, _ = _augmented(yaw_deg=100.0)
+    assert_allclose(after["hinge"], before["hinge"])
 
 
-def test_one_unknown_cloud_leaves_the_mean_of_the_others() -> None:
-    network = headed("pointnet").eval()
-    with torch.inference_mode():
-        losses, _ = joint_losses(network, clouds(), LABELS, targets())
-        features = network.features(clouds())
-    for key, target in targets().items():
-        if key in HEADS:
-            head = network.heads[key]
-            assert isinstance(head, Head)
-            with torch.inference_mode():
-                each = head.losses(head(features), target.nan_to_num())
-            known = each if key == "door" else each[[0, 2]]
-            torch.testing.assert_close(losses[key], known.mean())
+def test_missing_targets_stay_missing_under_augmentation() -> None:
+    missing = head_targets([WITHOUT_DOOR] * 50, np.zeros((50, 3), dtype=np.float32))
+    draw = draw_augmentation(Augmentation(yaw_deg=90, mirror=0.5, shift=0.1), np.random.default_rng(0), 50, 2)
+    moved = augment_targets(missing, draw)
+    assert not moved.pop("door").any()
+    assert all(np.isnan(values).all() for values in moved.values())
+
+
+def test_columns_of_targets_equal_the_manifest(scene_dataset: PreparedDataset) -> None:
+    rows = scene_dataset.rows
+    centroids = np.random.default_rng(0).uniform(-1, 3, (len(rows), 3)).astype(np.float32)
+    columns = head_columns(head_targets(rows, centroids), centroids)
+    for name in ("opening_angle_deg", "door_x_m", "door_y_m", "opening_width_m", "passable_width_m"):
+        expected = [float(row[name] or math.nan) for row in rows]
+        assert np.isfinite(expected).any()
+        assert_allclose(columns[name], expected, atol=2e-5)
+    turn = columns["door_yaw_deg"] - [float(row["door_yaw_deg"] or math.nan) for row in rows]
+    assert_allclose(np.cos(np.radians(turn[~np.isnan(turn)])), 1, atol=1e-6)
+    assert_allclose(columns["p_door"], [float(row["state"] != "no_door") for row in rows])
+    left = [row["hinge"] == "left" for row in rows if row["hinge"]]
+    assert_allclose(columns["p_hinge_left"][~np.isnan(columns["p_hinge_left"])], left)
+
+
+def test_impossible_opening_angles_become_the_nearest_possible_one() -> None:
+    values = np.radians(np.array([[-5.0], [-89.0], [-91.0], [-179.0], [0.0], [75.0], [180.0], [np.nan]]))
+    columns = head_columns({"angle": values.astype(np.float32)}, np.zeros((8, 3), np.float32))
+    assert_allclose(columns["opening_angle_deg"], [0, 0, 180, 180, 0, 75, 180, np.nan], atol=1e-4)
+
+
+def test_outputs_are_decoded_to_columns() -> None:
+    angle, yaw = torch.tensor([[1.1]]), 2.5
+    values = {
+        "angle": HEADS["angle"].decode(torch.cat([angle.cos(), angle.sin()], dim=1)).numpy(),
+        "frame": HEADS["frame"].decode(torch.tensor([[0.1, -0.2, math.cos(yaw), math.sin(yaw)]])).numpy(),
+    }
+    columns = head_columns(values, np.array([[1.0, 0.5, 0.0]], dtype=np.float32))
+    assert_allclose(columns["opening_angle_deg"], math.degrees(1.1), rtol=1e-6)
+    assert_allclose([columns["door_x_m"][0], columns["door_y_m"][0]], [1.3, -0.1], atol=1e-6)
+    assert_allclose(columns["door_yaw_deg"], math.degrees(2.5) - 90, rtol=1e-6)
 
 
 def test_losses_worked_by_hand() -> None:
     quarter = torch.tensor([[math.pi / 2]])
-    assert float(OpeningAngle(8).losses(torch.tensor([[0.0, 1.0]]), quarter)) == pytest.approx(0, abs=1e-6)
-    assert float(OpeningAngle(8).losses(torch.tensor([[1.0, 0.0]]), quarter)) == pytest.approx(math.sqrt(2))
-    assert float(HingeSide(8).losses(torch.zeros(1, 1), torch.ones(1, 1))) == pytest.approx(math.log(2))
-    assert float(Widths(8).losses(torch.tensor([[0.5, 0.25]]), torch.tensor([[0.25, 0.5]]))) == pytest.approx(
-        1.5
-    )
+    angle, hinge, widths, frame = (HEADS[name].loss for name in ("angle", "hinge", "widths", "frame"))
+    assert float(angle(torch.tensor([[0.0, 1.0]]), quarter)) == pytest.approx(0, abs=1e-6)
+    assert float(angle(torch.tensor([[1.0, 0.0]]), quarter)) == pytest.approx(math.sqrt(2))
+    assert float(hinge(torch.zeros(1, 1), torch.ones(1, 1))) == pytest.approx(math.log(2))
+    assert float(widths(torch.tensor([[0.5, 0.25]]), torch.tensor([[0.25, 0.5]]))) == pytest.approx(1.5)
     outputs = torch.tensor([[0.3, 0.4, 1.0, 0.0]])
-    assert float(FramePose(8).losses(outputs, torch.zeros(1, 3))) == pytest.approx(3 * 0.5)
+    assert float(frame(outputs, torch.zeros(1, 3))) == pytest.approx(3 * 0.5)
 
 
-def test_angles_near_a_full_turn_are_near_each_other() -> None:
-    head = FramePose(8)
+def test_yaw_loss_is_small_across_a_full_turn() -> None:
+    head = HEADS["frame"]
     outputs = torch.tensor([[0.0, 0.0, math.cos(3.14), math.sin(3.14)]])
-    assert float(head.losses(outputs, torch.tensor([[0.0, 0.0, -3.14]]))) < 0.01
+    assert float(head.loss(outputs, torch.tensor([[0.0, 0.0, -3.14]]))) < 0.01
     assert float(head.decode(outputs)[0, 2]) == pytest.approx(3.14)
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.5, math.pi / 2, 2.9])
-def test_an_angle_comes_back(angle: float) -> None:
+def test_angle_is_decoded_from_a_direction_of_any_length(angle: float) -> None:
     outputs = 3 * torch.tensor([[math.cos(angle), math.sin(angle)]])
-    assert float(OpeningAngle(8).decode(outputs)) == pytest.approx(angle)
+    assert float(HEADS["angle"].decode(outputs)) == pytest.approx(angle)
 
 
-def test_interpolation_is_scipys() -> None:
-    points, centres = clouds(300).double(), clouds(40).double()
-    features = torch.rand(3, 40, 5, dtype=torch.float64)
-    found = interpolate(features, centres, points)
-    for cloud in range(3):
-        distance, index = cKDTree(centres[cloud].numpy()).query(points[cloud].numpy(), 3)
-        weight = 1 / (np.square(distance) + 1e-8)
-        weight /= weight.sum(axis=1, keepdims=True)
-        expected = (features[cloud].numpy()[index] * weight[..., None]).sum(axis=1)
-        np.testing.assert_allclose(found[cloud].numpy(), expected, atol=1e-9)
+def test_metrics_worked_by_hand() -> None:
+    rows = [
+        ROW,
+        ROW | {"state": "semi_open", "opening_angle_deg": "40", "hinge": "right"},
+        ROW | {"state": "closed", "opening_angle_deg": "0", "hinge": ""},
+        WITHOUT_DOOR,
+    ]
+    nan = math.nan
+    columns = {
+        "p_door": [0.9, 0.4, 0.8, 0.5],
+        "opening_angle_deg": [80.0, 45.0, 3.0, 9.0],
+        "p_hinge_left": [0.9, 0.6, 0.5, 0.5],
+        "door_x_m": [2.3, 2.0, 2.0, 1.0],
+        "door_y_m": [0.9, 0.5, 0.5, 1.0],
+        "door_yaw_deg": [-90.0, 90.0, 89.0, 1.0],
+        "opening_width_m": [1.0, 0.9, nan, 1.0],
+    }
+    metrics = head_metrics({name: np.array(values) for name, values in columns.items()}, rows)
+    assert metrics["door_auroc"] == pytest.approx(2 / 3)
+    assert metrics["angle_error_open_deg"] == 10
+    assert metrics["angle_error_semi_open_deg"] == 5
+    assert metrics["hinge_accuracy"] == metrics["hinge_accuracy_not_closed"] == 0.5
+    assert metrics["frame_position_error_median_m"] == 0
+    assert metrics["frame_position_error_p90_m"] == pytest.approx(0.4)
+    assert metrics["frame_yaw_error_median_deg"] == 1
+    # A head without all of its columns has no metrics.
+    assert math.isnan(metrics["opening_width_error_m"])
+    columns["passable_width_m"] = [0.6, 0.7, 0.6, 0.0]
+    metrics = head_metrics({name: np.array(values) for name, values in columns.items()}, rows)
+    assert metrics["opening_width_error_m"] == pytest.approx(0.05)
+    assert metrics["passable_width_error_m"] == pytest.approx(0.1 / 3)
+    assert set(metrics) == {metric.name for head in HEADS.values() for metric in head.metrics}
 
 
-def test_a_joined_layer_is_a_layer_on_both() -> None:
-    layer = JoinedDense(4, 6, 5).double()
-    rows, features = torch.rand(2, 7, 4, dtype=torch.float64), torch.rand(2, 6, dtype=torch.float64)
-    both = torch.cat([rows, features.unsqueeze(1).expand(-1, 7, -1)], dim=-1)
-    weight = torch.cat([layer.own.weight, layer.cloud.weight], dim=1)
-    expected = torch.nn.functional.batch_norm((both @ weight.T).flatten(0, 1), None, None, training=True)
-    torch.testing.assert_close(layer(rows, features), expected.relu().view(2, 7, 5))
-
-
-def test_errors_name_what_is_known() -> None:
-    network = create_network("point2sequence")
-    with pytest.raises(ConfigError, match="unknown head 'angel'; did you mean 'angle'"):
-        add_heads(network, ["angel"])
-    with pytest.raises(ConfigError, match="Point2Sequence has no per-point branch"):
-        add_heads(network, ["parts"])
+def test_parts_without_a_label_are_skipped() -> None:
+    head = POINT_HEADS["parts"]
+    target = head.target(np.array([[0, 5, 255, 1]], dtype=np.uint8))
+    assert target.tolist() == [[0, 5, -1, 1]]
+    counts = head.confusion(target, np.array([[0, 5, 3, 5]]))
+    assert counts.sum() == 3
+    assert counts[1, 5] == 1
+    assert_allclose(head.metric(counts), [1, 0, np.nan, np.nan, np.nan, 0.5])
+    logits = torch.zeros(1, 4, len(head.classes))
+    assert float(head.loss(logits, torch.from_numpy(target))) == pytest.approx(math.log(6))

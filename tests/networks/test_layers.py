@@ -11,7 +11,15 @@ from torch import Tensor, nn
 
 from doorstate.networks.kernels.ops import gather_rows
 from doorstate.networks.kernels.search import ball_query
-from doorstate.networks.layers import Dense, DenseMax, PointLinear, PooledMLP, RowBatchNorm, set_batchnorm
+from doorstate.networks.layers import (
+    Dense,
+    DenseMax,
+    JoinedDense,
+    PointLinear,
+    PooledMLP,
+    RowBatchNorm,
+    set_batchnorm,
+)
 from tests.networks import plain
 
 DTYPES = [torch.float64, torch.float32]
@@ -129,3 +137,12 @@ def test_set_batchnorm_changes_what_it_is_told_to() -> None:
     assert [(m.eps, m.momentum) for m in (network[0], network[1][0])] == [(1e-3, 0.1)] * 2
     set_batchnorm(network, momentum=0.5)
     assert [(m.eps, m.momentum) for m in (network[0], network[1][0])] == [(1e-3, 0.5)] * 2
+
+
+def test_joined_layer_equals_a_layer_on_the_concatenation() -> None:
+    layer = JoinedDense(4, 6, 5).double()
+    rows, features = torch.rand(2, 7, 4, dtype=torch.float64), torch.rand(2, 6, dtype=torch.float64)
+    both = torch.cat([rows, features.unsqueeze(1).expand(-1, 7, -1)], dim=-1)
+    weight = torch.cat([layer.own.weight, layer.cloud.weight], dim=1)
+    expected = torch.nn.functional.batch_norm((both @ weight.T).flatten(0, 1), None, None, training=True)
+    torch.testing.assert_close(layer(rows, features), expected.relu().view(2, 7, 5))

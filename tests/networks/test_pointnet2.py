@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 import torch
+from scipy.spatial import cKDTree
 from torch import Tensor, nn
 
 from doorstate.errors import ConfigError
-from doorstate.networks.pointnet2 import VARIANTS, PointNet2, Scale, SetAbstraction
+from doorstate.networks.pointnet2 import VARIANTS, PointNet2, Scale, SetAbstraction, interpolate
 from tests.networks import plain
 
 SCALES = (Scale(0.5, 4, (6, 7, 8)), Scale(1, 8, (5, 6, 9)))
@@ -119,3 +121,15 @@ def test_order_after_the_centres_matters_only_to_full_balls() -> None:
 def test_an_unknown_variant_is_refused() -> None:
     with pytest.raises(ConfigError, match="no variant 'mrg': use one of ssg, msg"):
         PointNet2(variant="mrg")
+
+
+def test_interpolation_equals_scipy() -> None:
+    points, centres = torch.rand(3, 300, 3, dtype=torch.float64), torch.rand(3, 40, 3, dtype=torch.float64)
+    features = torch.rand(3, 40, 5, dtype=torch.float64)
+    found = interpolate(features, centres, points)
+    for cloud in range(3):
+        distance, index = cKDTree(centres[cloud].numpy()).query(points[cloud].numpy(), 3)
+        weight = 1 / (np.square(distance) + 1e-8)
+        weight /= weight.sum(axis=1, keepdims=True)
+        expected = (features[cloud].numpy()[index] * weight[..., None]).sum(axis=1)
+        np.testing.assert_allclose(found[cloud].numpy(), expected, atol=1e-9)

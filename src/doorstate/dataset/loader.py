@@ -19,8 +19,8 @@ from doorstate.clouds.augmentation import (
 )
 from doorstate.clouds.preparation import centroids, normalize
 from doorstate.dataset.store import PreparedDataset
-from doorstate.dataset.targets import IGNORE_INDEX, augmented, door_targets, known_parts
 from doorstate.errors import ConfigError
+from doorstate.networks.heads import IGNORE_INDEX, POINT_HEADS, augment_targets, head_targets
 from doorstate.types import DOOR, PARTS, DoorState
 
 FindNeighbours = Callable[[Tensor], tuple[Tensor, ...]]
@@ -78,7 +78,7 @@ class CloudLoader:
             num_points: of each cloud.
             find_neighbours: done once per cloud, when it is first needed, before any augmentation: give it only with
                 augmentations that leave its result as it is.
-            heads: answers that the batches hold targets for (dataset.targets); with "door" among them samples without
+            heads: names of the heads that the batches hold targets for; with "door" among them samples without
                 one are allowed, and labelled `IGNORE_INDEX`.
             more: data sets whose samples follow, all of them.
 
@@ -134,9 +134,9 @@ class CloudLoader:
             points = apply_augmentation(points, draw)
         known = None if self._neighbours is None else self._neighbours(chosen)
         door = {name: values[chosen] for name, values in self._targets.items()}
-        targets = {name: torch.from_numpy(values) for name, values in augmented(door, draw).items()}
+        targets = {name: torch.from_numpy(values) for name, values in augment_targets(door, draw).items()}
         if self._parts is not None:
-            targets[PARTS] = torch.from_numpy(known_parts(self._parts[chosen]))
+            targets[PARTS] = torch.from_numpy(POINT_HEADS[PARTS].target(self._parts[chosen]))
         return Batch(torch.from_numpy(points), torch.from_numpy(self._labels[chosen]), known, targets)
 
 
@@ -157,8 +157,7 @@ def _load(
     centroids_m = centroids(points)
     check_states(dataset, sample_ids, heads)
     labels = np.where(dataset.labels[indices] < len(DoorState), dataset.labels[indices], IGNORE_INDEX)
-    wanted = door_targets([dataset.rows[index] for index in indices], centroids_m) if heads else {}
-    targets = {name: values for name, values in wanted.items() if name in heads}
+    targets = head_targets([dataset.rows[index] for index in indices], centroids_m, heads)
     parts = dataset.parts_of(indices, num_points) if PARTS in heads else None
     return _Loaded(normalize(points), centroids_m, labels, targets, parts)
 

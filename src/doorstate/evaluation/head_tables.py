@@ -7,29 +7,16 @@ import math
 from collections.abc import Iterator
 
 import numpy as np
-from sklearn.metrics import roc_auc_score
 
 from doorstate.dataset.store import PreparedDataset
-from doorstate.evaluation.metrics import Floats, ratio
+from doorstate.evaluation.metrics import Floats
 from doorstate.evaluation.results import Answers, ComparisonResults
 from doorstate.evaluation.stratum_tables import rows_of
 from doorstate.evaluation.table import Table, number
-from doorstate.simulation.manifest import numbers
-from doorstate.types import DECISION_THRESHOLD, NO_DOOR, STATES, Part
+from doorstate.networks.heads import HEADS, POINT_HEADS, head_metrics
+from doorstate.types import DECISION_THRESHOLD, NO_DOOR, STATES
 
-_ERRORS = {
-    "door, AUROC": 4,
-    "opening angle, semi-open: mean error, °": 1,
-    "open": 1,
-    "hinge side": 4,
-    "of doors not closed": 4,
-    "frame position: median error, m": 3,
-    "90th percentile": 3,
-    "yaw: median error, °": 1,
-    "opening width: mean error, m": 3,
-    "passable width: mean error, m": 3,
-}
-"""Columns of `answers_table`, and their digits."""
+_METRICS = [metric for head in HEADS.values() for metric in head.metrics]
 
 
 def answers_table(results: ComparisonResults, dataset: PreparedDataset) -> Table:
@@ -39,11 +26,11 @@ def answers_table(results: ComparisonResults, dataset: PreparedDataset) -> Table
         given = results.answers(method)
         if given is not None:
             found = answer_errors(given, dataset)
-            cells = (number(found[name], digits) for name, digits in _ERRORS.items())
+            cells = (number(found[metric.title], metric.digits) for metric in _METRICS)
             rows.append((method, str(len(given.sample_ids)), *cells))
     return Table(
         "Answers of further heads",
-        ("network", "samples", *_ERRORS),
+        ("network", "samples", *(metric.title for metric in _METRICS)),
         tuple(rows),
         "AUROC: how well the probability of a door puts samples with a door above those without. Hinge: share right; a "
         "flush closed leaf may show its side by nothing but the handle.",
@@ -57,36 +44,8 @@ def answer_errors(given: Answers, dataset: PreparedDataset) -> dict[str, float]:
         given: what one network says.
         dataset: that the samples are of.
     """
-    manifest = rows_of(dataset, given)
-
-    def off(name: str, *others: str) -> Floats:
-        return np.abs(given.columns.get(name, math.nan) - numbers(manifest, name, *others))
-
-    def turned(name: str) -> Floats:
-        difference = given.columns.get(name, math.nan) - numbers(manifest, name)
-        return np.abs((difference + 180) % 360 - 180)
-
-    state = np.array([row["state"] for row in manifest])
-    angle = turned("opening_angle_deg")
-    hinge = np.array([row.get("hinge") or row.get("door.hinge", "") for row in manifest])
-    said_left = given.columns.get("p_hinge_left", np.full(len(state), math.nan))
-    hinge_right = np.where(
-        (hinge != "") & ~np.isnan(said_left), (said_left >= DECISION_THRESHOLD) == (hinge == "left"), math.nan
-    )
-    place = np.hypot(off("door_x_m"), off("door_y_m"))
-    found = (
-        _auroc(given, state),
-        _mean(angle[state == "semi_open"]),
-        _mean(angle[state == "open"]),
-        _mean(hinge_right),
-        _mean(hinge_right[(state == "semi_open") | (state == "open")]),
-        _quantile(place, 0.5),
-        _quantile(place, 0.9),
-        _quantile(turned("door_yaw_deg"), 0.5),
-        _mean(off("opening_width_m", "door.opening_width_m")),
-        _mean(off("passable_width_m")),
-    )
-    return dict(zip(_ERRORS, found, strict=True))
+    metrics = head_metrics(given.columns, rows_of(dataset, given))
+    return {metric.title: metrics[metric.name] for metric in _METRICS}
 
 
 def _of_doors(results: ComparisonResults) -> Iterator[tuple[str, Answers]]:
@@ -148,36 +107,21 @@ def four_answers_table(results: ComparisonResults, dataset: PreparedDataset) -> 
 
 def parts_table(results: ComparisonResults) -> Table:
     """Intersection over union of each part of the scene, points of all folds together."""
-    parts = [part for part in Part if part != Part.NONE]
+    head = POINT_HEADS["parts"]
     rows = []
     for method in results.networks:
         counts = [run.metrics.get("test_part_counts") for run in results.runs_of(method)]
         if not all(counts):
             continue
         joined = np.array(counts).sum(axis=0)  # (parts, parts)
-        right = np.diagonal(joined)
-        union = joined.sum(axis=0) + joined.sum(axis=1) - right
-        shares = ratio(right, union)
+        shares = head.metric(joined)
         mean = float(np.nanmean(shares))
         rows.append((method, *(number(float(share), 3) for share in shares), number(mean, 3)))
-    columns = ("network", *(part.name.lower() for part in parts), "mean")
+    columns = ("network", *head.classes, "mean")
     return Table("Parts of points: intersection over union", columns, tuple(rows))
-
-
-def _auroc(given: Answers, state: np.ndarray) -> float:
-    doors = state != NO_DOOR
-    if "p_door" not in given.columns or doors.all() or not doors.any():
-        return math.nan
-    return float(roc_auc_score(doors, given.columns["p_door"]))
 
 
 def _mean(values: Floats) -> float:
     """Of what is known."""
     known = values[~np.isnan(values)]
     return float(known.mean()) if len(known) else math.nan
-
-
-def _quantile(values: Floats, share: float) -> float:
-    """Of what is known."""
-    known = values[~np.isnan(values)]
-    return float(np.quantile(known, share)) if len(known) else math.nan

@@ -28,8 +28,9 @@ from doorstate.inference.reference_clouds import LabelledClouds
 from doorstate.inference.torch_backend import TorchBackend
 from doorstate.networks.base import PointNetwork
 from doorstate.networks.card import WeightsCard
-from doorstate.networks.decoding import Columns
-from doorstate.networks.heads import STATE, answers
+from doorstate.networks.head_layers import head_outputs
+from doorstate.networks.heads import HEADS, STATE
+from doorstate.networks.heads.spec import Columns
 from doorstate.types import STATES, Points
 
 if TYPE_CHECKING:
@@ -49,11 +50,7 @@ _METADATA = {
         f"centring and division by {SCALE_M} m are in the graph"
     ),
     "labels": ",".join(STATES),
-    "heads": (
-        "door: probability of one; angle: radians; hinge: probability of left; frame: x, y of the opening's middle, "
-        f"divided by {SCALE_M} after the mean of the points is taken away, and the yaw in radians of the wall's "
-        f"normal towards the camera; widths: of the opening and of the free way, divided by {SCALE_M}"
-    ),
+    "heads": "; ".join(f"{head.name}: {head.description}" for head in HEADS.values()),
 }
 
 
@@ -79,8 +76,8 @@ class _Graph(nn.Module):
     def forward(self, points: Tensor) -> tuple[Tensor, ...]:
         # As clouds.preparation.normalize, to the last digit: what is just inside a ball must not be just outside.
         centroid = points.mean(1, keepdim=True, dtype=torch.float64).to(torch.float32)
-        said = answers(self.network, (points - centroid) / SCALE_M, parts=False)
-        return ((said.pop(STATE) / self.temperature).softmax(1), *said.values())
+        outputs = head_outputs(self.network, (points - centroid) / SCALE_M, with_points=False)
+        return ((outputs.pop(STATE) / self.temperature).softmax(1), *outputs.values())
 
 
 def check_installed() -> None:

@@ -13,7 +13,8 @@ from pydantic import ValidationError
 from doorstate.clouds.preparation import centroids
 from doorstate.errors import WeightsError, missing_extra, summarize_exception
 from doorstate.networks.card import WeightsCard
-from doorstate.networks.decoding import Columns, in_metres
+from doorstate.networks.heads import head_columns
+from doorstate.networks.heads.spec import Columns
 from doorstate.types import PARTS, STATES, Points
 
 INPUT, OUTPUT = "points", "probabilities"
@@ -72,7 +73,7 @@ class OnnxBackend:
             points: n is as many as the file was exported for.
         """
         answer, *heads = self._session.run([OUTPUT, *self._heads], {INPUT: points})
-        return answer, in_metres(dict(zip(self._heads, heads, strict=True)), centroids(points))
+        return answer, head_columns(dict(zip(self._heads, heads, strict=True)), centroids(points))
 
 
 def heads_told(card: WeightsCard) -> tuple[str, ...]:

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from doorstate.clouds.preparation import centroids, normalize
 from doorstate.networks.base import PointNetwork
-from doorstate.networks.decoding import Columns, in_metres
-from doorstate.networks.heads import STATE, answers
+from doorstate.networks.head_layers import head_outputs
+from doorstate.networks.heads import STATE, head_columns
+from doorstate.networks.heads.spec import Columns
 from doorstate.types import Points
 
 
@@ -36,6 +37,10 @@ class TorchBackend:
             kind: the number type of the network's weights.
         """
         with torch.inference_mode():
-            said = answers(self.network, torch.from_numpy(normalize(points).astype(kind)), parts=False)
-            calibrated: NDArray[np.float32] = (said.pop(STATE) / self.temperature).softmax(1).numpy()
-        return calibrated, in_metres({name: each.numpy() for name, each in said.items()}, centroids(points))
+            outputs = head_outputs(
+                self.network, torch.from_numpy(normalize(points).astype(kind)), with_points=False
+            )
+            calibrated: NDArray[np.float32] = (outputs.pop(STATE) / self.temperature).softmax(1).numpy()
+        return calibrated, head_columns(
+            {name: values.numpy() for name, values in outputs.items()}, centroids(points)
+        )

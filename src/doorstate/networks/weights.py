@@ -16,7 +16,7 @@ from doorstate.errors import WeightsError
 from doorstate.networks import create_network
 from doorstate.networks.base import PointNetwork
 from doorstate.networks.card import WeightsCard
-from doorstate.networks.heads import add_heads
+from doorstate.networks.head_layers import add_heads
 from doorstate.types import STATES
 
 

@@ -29,7 +29,8 @@ from doorstate.dataset.splits import (
 from doorstate.dataset.store import PreparedDataset, open_dataset
 from doorstate.errors import ConfigError, RunError, first_validation_error
 from doorstate.networks import create_network, list_networks, network_class
-from doorstate.networks.heads import STATE, add_heads
+from doorstate.networks.head_layers import add_heads
+from doorstate.networks.heads import STATE
 from doorstate.rules import create_rule
 from doorstate.training.fit import RunConfig, fit, threads
 from doorstate.training.recipes import Recipe, find_recipe

@@ -31,20 +31,19 @@ from doorstate._models import FrozenModel
 from doorstate.dataset.loader import Batch, CloudLoader
 from doorstate.dataset.splits import Role
 from doorstate.dataset.store import PreparedDataset
-from doorstate.dataset.targets import IGNORE_INDEX
 from doorstate.errors import ConfigError, DatasetError, RunError, WeightsError
 from doorstate.networks import create_network
 from doorstate.networks.base import PointNetwork
 from doorstate.networks.card import WeightsCard
-from doorstate.networks.decoding import in_metres, write_answers
-from doorstate.networks.heads import STATE, add_heads, answers, joint_losses
+from doorstate.networks.head_layers import add_heads, head_outputs, joint_losses
+from doorstate.networks.heads import IGNORE_INDEX, POINT_HEADS, STATE, head_columns
 from doorstate.networks.layers import set_batchnorm
 from doorstate.networks.weights import load_into, read_card, save_weights
 from doorstate.training.environment import bf16_is_quick, compiled, describe_environment
 from doorstate.training.optimizers import create_optimizers
 from doorstate.training.recipes import Recipe, batchnorm_momentum, learning_rate, resolution_of_epoch
-from doorstate.training.run_folder import RunFolder, write_predictions
-from doorstate.types import NO_DOOR, PARTS, STATES, Part
+from doorstate.training.run_folder import RunFolder, write_head_outputs, write_predictions
+from doorstate.types import NO_DOOR, PARTS, STATES
 
 _ROLES: tuple[Role, ...] = ("train", "val", "test")
 _EVALUATION_BATCH = 32
@@ -64,7 +63,7 @@ class RunConfig(FrozenModel):
     seed: int
     recipe: Recipe
     start_from: str | None = None  # a weights file to go on from
-    heads: tuple[str, ...] = ()  # answers besides the state (networks.heads)
+    heads: tuple[str, ...] = ()  # heads besides the state (networks.heads)
     extra_train_datasets: tuple[
         str, ...
     ] = ()  # data sets whose samples are all learned besides those of the fold
@@ -76,7 +75,7 @@ class Evaluation(NamedTuple):
     loss: float
     probabilities: np.ndarray
     labels: np.ndarray  # (M,) int64, IGNORE_INDEX without a door
-    answers: dict[str, np.ndarray]  # by head, (M, answers), in the network's units
+    head_values: dict[str, np.ndarray]  # by head, (M, num_values), in the network's units
     part_counts: np.ndarray | None  # (parts, parts) points by true and predicted part
 
     @property
@@ -156,26 +155,19 @@ def evaluate(network: PointNetwork, loader: CloudLoader, fabric: lightning_fabri
     for batch in loader.in_order(_EVALUATION_BATCH):
         on_device = fabric.to_device(batch)
         with fabric.autocast():
-            said = answers(network, on_device.points, on_device.neighbourhoods)
-        if PARTS in said:
-            counts = confusion_counts(batch.targets[PARTS], said.pop(PARTS).argmax(-1).cpu())
+            outputs = head_outputs(network, on_device.points, on_device.neighbourhoods)
+        if PARTS in outputs:
+            predicted = outputs.pop(PARTS).argmax(-1).cpu().numpy()
+            counts = POINT_HEADS[PARTS].confusion(batch.targets[PARTS].numpy(), predicted)
             part_counts = counts if part_counts is None else part_counts + counts
-        for name, values in said.items():
+        for name, values in outputs.items():
             found[name].append(values.float().cpu())
         found["labels"].append(batch.labels)
     joined = {name: torch.cat(values) for name, values in found.items()}
     logits, labels = joined.pop(STATE), joined.pop("labels")
     loss = functional.cross_entropy(logits, labels, ignore_index=IGNORE_INDEX).item()
-    others = {name: values.numpy() for name, values in joined.items()}
-    return Evaluation(loss, logits.softmax(1).numpy(), labels.numpy(), others, part_counts)
-
-
-def confusion_counts(parts: Tensor, said: Tensor) -> np.ndarray:
-    """(parts, parts) points by true and predicted part; those of unknown part, negative, are left out."""
-    size = len(Part) - 1
-    known = parts >= 0
-    counts = torch.bincount(parts[known] * size + said[known], minlength=size**2)
-    return counts.view(size, size).numpy()
+    head_values = {name: values.numpy() for name, values in joined.items()}
+    return Evaluation(loss, logits.softmax(1).numpy(), labels.numpy(), head_values, part_counts)
 
 
 class EpochProgress(NamedTuple):
@@ -271,8 +263,10 @@ class _Trainer:
                 doors = [sample for sample, door in zip(samples, found.doors, strict=True) if door]
                 write_predictions(path, doors, found.labels[found.doors], found.probabilities[found.doors])
                 metrics |= {f"{role}_macro_f1": found.macro_f1, f"{role}_accuracy": found.accuracy}
-                if role == "test" and found.answers:
-                    write_answers(self.run.head_outputs, samples, in_metres(found.answers, loader.centroids))
+                if role == "test" and found.head_values:
+                    write_head_outputs(
+                        self.run.head_outputs, samples, head_columns(found.head_values, loader.centroids)
+                    )
                 if role == "test" and found.part_counts is not None:
                     metrics["test_part_counts"] = found.part_counts.tolist()
         return metrics

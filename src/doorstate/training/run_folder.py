@@ -121,6 +121,18 @@ def write_predictions(
     )
 
 
+def write_head_outputs(path: Path, samples: Sequence[str], columns: Mapping[str, np.ndarray]) -> None:
+    """Write the head columns of every sample, five digits each."""
+    rows = zip(*columns.values(), strict=True)
+    write_csv(
+        path,
+        [
+            {"sample_id": sample, **{name: f"{value:.5g}" for name, value in zip(columns, row, strict=True)}}
+            for sample, row in zip(samples, rows, strict=True)
+        ],
+    )
+
+
 def read_json(path: Path) -> dict[str, Any]:
     """Read a JSON object.
 

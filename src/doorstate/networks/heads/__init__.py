@@ -1,16 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Heads: outputs of a network besides the state. Imports no torch.
 
-The numbers of a head have three forms. *Outputs* leave its last linear layer. *Values* are decoded outputs, and targets,
-in the network's units and axes: clouds are centred and divided by 3 m (clouds.preparation.normalize), angles are in
-radians. *Columns* are values in metres and degrees in the sensor frame, named as in tables. NaN is a number that the
-manifest does not hold.
+The numbers of a head have three forms. *Outputs* leave its last linear layer. *Values* are decoded outputs, and
+targets, in the network's units and axes: clouds are centred and divided by 3 m (clouds.preparation.normalize), angles
+are in radians. *Columns* are values in metres and degrees in the sensor frame, named as in tables. NaN is a number
+that the manifest does not hold.
 
 A new head is one `HeadSpec` in a file of its own, entered in `HEADS`.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -22,11 +23,20 @@ from doorstate.networks.heads.door import DOOR_HEAD
 from doorstate.networks.heads.frame import FRAME_HEAD
 from doorstate.networks.heads.hinge import HINGE_HEAD
 from doorstate.networks.heads.parts import PARTS_HEAD
-from doorstate.networks.heads.spec import Column, Floats, HeadSpec, ManifestRow, Metric, PointHeadSpec, Values
+from doorstate.networks.heads.spec import (
+    Column,
+    Columns,
+    Floats,
+    HeadSpec,
+    ManifestRow,
+    Metric,
+    PointHeadSpec,
+    Values,
+)
 from doorstate.networks.heads.widths import WIDTHS_HEAD
 from doorstate.types import Points
 
-__all__ = ["HEADS", "POINT_HEADS", "STATE", "Column", "HeadSpec", "Metric", "PointHeadSpec"]
+__all__ = ["HEADS", "IGNORE_INDEX", "POINT_HEADS", "STATE", "Column", "HeadSpec", "Metric", "PointHeadSpec"]
 
 HEADS = {head.name: head for head in (DOOR_HEAD, ANGLE_HEAD, HINGE_HEAD, FRAME_HEAD, WIDTHS_HEAD)}
 """Heads with one vector per cloud, by name."""
@@ -34,6 +44,8 @@ POINT_HEADS = {head.name: head for head in (PARTS_HEAD,)}
 """Heads with one class per point, by name."""
 STATE = "state"
 """Name of the output of the network's own classification head."""
+IGNORE_INDEX = -100
+"""Label of a cloud without a door; torch's cross entropy skips it."""
 
 
 def head_targets(
@@ -56,16 +68,35 @@ def augment_targets(targets: Mapping[str, Values], draw: AugmentationDraw | None
     return {name: HEADS[name].augment(target, draw).astype(np.float32) for name, target in targets.items()}
 
 
-def head_columns(values: Mapping[str, NDArray[np.floating]], centroids: Points) -> dict[str, Floats]:
+def head_columns(values: Mapping[str, NDArray[np.floating]], centroids: Points) -> Columns:
     """Return (M,) numbers in metres and degrees in the sensor frame, by column name.
 
     Args:
         values: (M, num_values) decoded outputs by head.
         centroids: (M, 3) means of the clouds, in metres.
     """
-    columns: dict[str, Floats] = {}
+    columns: Columns = {}
     for name, head in HEADS.items():
         if name in values:
             numbers = head.to_columns(values[name].astype(np.float64), centroids)
             columns |= zip(head.column_names, numbers.T, strict=True)
     return columns
+
+
+def head_metrics(columns: Mapping[str, Floats], rows: Sequence[ManifestRow]) -> dict[str, float]:
+    """Return all metrics of all heads by name; NaN for heads without columns, or if no sample counts.
+
+    Args:
+        columns: (M,) numbers by column name, as of `head_columns`.
+        rows: M lines of the manifest.
+    """
+    states = np.array([row["state"] for row in rows])
+    metrics: dict[str, float] = {}
+    for head in HEADS.values():
+        if all(name in columns for name in head.column_names):
+            numbers = np.stack([columns[name] for name in head.column_names], axis=1)
+            truth = head.truth(rows)
+            metrics |= {metric.name: metric.compute(numbers, truth, states) for metric in head.metrics}
+        else:
+            metrics |= {metric.name: math.nan for metric in head.metrics}
+    return metrics

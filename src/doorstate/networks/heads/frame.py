@@ -10,7 +10,13 @@ from numpy.typing import NDArray
 
 from doorstate.clouds.augmentation import AugmentationDraw
 from doorstate.clouds.preparation import SCALE_M
-from doorstate.networks.heads.shared import angle_error_deg, direction_loss, distance, plan_transform, quantile
+from doorstate.networks.heads.shared import (
+    angle_error_deg,
+    direction_loss,
+    distance,
+    plan_transform,
+    quantile,
+)
 from doorstate.networks.heads.spec import Column, Floats, HeadSpec, Metric, States, Values
 from doorstate.types import Points
 

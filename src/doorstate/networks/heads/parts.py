@@ -39,7 +39,9 @@ def _confusion(target: NDArray[np.int64], predicted: NDArray[np.int64]) -> NDArr
 def _intersection_over_union(counts: NDArray[np.int64]) -> Floats:
     intersection = np.diagonal(counts)
     union = counts.sum(axis=0) + counts.sum(axis=1) - intersection
-    return np.divide(intersection, union, out=np.full(len(counts), np.nan), where=union > 0)
+    iou: Floats = np.full(len(counts), np.nan)
+    np.divide(intersection, union, out=iou, where=union > 0)
+    return iou
 
 
 PARTS_HEAD = PointHeadSpec(

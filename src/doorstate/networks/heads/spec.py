@@ -21,6 +21,8 @@ Floats = NDArray[np.float64]
 Values = NDArray[np.float32]
 States = NDArray[np.str_]
 ManifestRow = Mapping[str, str]
+Columns = dict[str, Floats]
+"""(M,) numbers by column name."""
 
 
 @dataclass(frozen=True)
