@@ -32,7 +32,7 @@ from benchmarks.mutations import (
 )
 from doorstate.clouds.preparation import MIN_POINTS, is_measured
 from doorstate.errors import MAX_MESSAGE_LENGTH, CameraError, CloudError, DoorstateError
-from doorstate.inference.predictor import Predictor
+from doorstate.inference.network_predictor import NetworkPredictor
 from doorstate.io.bags import Bag, BagTopic, StampedCloud, open_bag
 from doorstate.io.camera import Intrinsics, Pinhole, read_intrinsics
 from doorstate.io.messages import CLOUD, COMPRESSED_IMAGE, IMAGE, points_from_message
@@ -79,8 +79,8 @@ class Fuzzer:
         whole = raw_cloud()
         self.scene = np.ascontiguousarray(whole[::every, ::every])
         # These weights always give a state: one that is withheld would look like input that was not usable.
-        self._predict = Predictor.load("ogurob-pointnet2", MIN_POINTS, gate=None)
-        self._gated = Predictor(self._predict.network, self._predict.card, MIN_POINTS)
+        self._predict = NetworkPredictor.from_weights("ogurob-pointnet2", num_points=MIN_POINTS, gate=None)
+        self._gated = NetworkPredictor(self._predict.backend, MIN_POINTS)
         self._app = create_app(self._gated, Limits(max_bytes=2**20, queue=1, workers=1))
         self._runner = asyncio.Runner()
         self._folder = scratch / str(os.getpid())

@@ -13,6 +13,7 @@ from benchmarks.store import Group
 from doorstate._jobs import Progress
 from doorstate.clouds.preparation import is_measured
 from doorstate.evaluation.table import Table
+from doorstate.inference.network_predictor import NetworkPredictor
 from doorstate.inference.predictor import Predictor
 from doorstate.simulation.frames import Frame, replay
 from doorstate.simulation.generate import SampleRow
@@ -72,8 +73,8 @@ FAULTS: dict[str, Fault] = {
 
 def measure(network: str, count: int, progress: Progress) -> list[Group]:
     """Answers of packaged weights, with and without gate, on doors they were not trained on, with every fault."""
-    predictor = Predictor.load(network)
-    careless = Predictor(predictor.network, predictor.card, predictor.points, gate=None)
+    predictor = NetworkPredictor.from_weights(network)
+    careless = NetworkPredictor(predictor.backend, gate=None)
     rows = []
     for number, (row, frame) in enumerate(comparison_frames(count, progress)):
         for name, fault in FAULTS.items():

@@ -21,9 +21,11 @@ from doorstate._jobs import Progress
 from doorstate._memory import keep_freed_memory
 from doorstate.clouds import preparation
 from doorstate.evaluation.table import Table
-from doorstate.inference import predictor
+from doorstate.inference import network_predictor
+from doorstate.inference.backends.onnx_backend import OnnxBackend
+from doorstate.inference.backends.torch_backend import TorchBackend
 from doorstate.inference.export import export_onnx
-from doorstate.inference.onnx_backend import OnnxBackend
+from doorstate.inference.network_predictor import NetworkPredictor
 from doorstate.inference.reference_clouds import LabelledClouds
 from doorstate.networks import create_network
 from doorstate.networks.card import WeightsCard
@@ -91,9 +93,9 @@ def latency_table(rows: Sequence[Group]) -> Table:
 
 def _predictors(
     name: str, points: int, threads: int, raw: Points, folder: Path
-) -> dict[str, predictor.Predictor]:
+) -> dict[str, NetworkPredictor]:
     network, card = create_network(name), WeightsCard(network=name, num_points=points)
-    predictors = {"torch": predictor.Predictor(network, card, points)}
+    predictors = {"torch": NetworkPredictor(TorchBackend(network, card))}
     for runtime, int8 in (("onnxruntime", False), ("onnxruntime int8", True)):
         path = folder / f"{name}-{points}-{runtime}.onnx"
         if not path.is_file():
@@ -102,7 +104,7 @@ def _predictors(
             ).points[None]
             labels = np.zeros(1, dtype=np.int64)
             export_onnx(path, network, card, LabelledClouds(cloud, labels), int8=int8)
-        predictors[runtime] = predictor.Predictor(OnnxBackend(path, threads), card, points)
+        predictors[runtime] = NetworkPredictor(OnnxBackend(path, threads))
     return predictors
 
 
@@ -117,11 +119,11 @@ def _summary(stages: dict[str, list[float]]) -> dict[str, dict[str, Any]]:
     }
 
 
-def _stages(predict: predictor.Predictor, raw: Points) -> dict[str, float]:
+def _stages(predict: NetworkPredictor, raw: Points) -> dict[str, float]:
     """Milliseconds of each stage of one call, taken inside it: stages that are timed one by one are other stages."""
     with (
         _timed(preparation, "farthest_point_indices") as sampling,
-        _timed(predictor, "prepare_cloud") as preparing,
+        _timed(network_predictor, "prepare_cloud") as preparing,
     ):
         total = predict(raw).milliseconds
     sample, prepare = sum(sampling), sum(preparing)

@@ -13,7 +13,9 @@ from benchmarks.tables import milliseconds
 from doorstate._jobs import Progress
 from doorstate._memory import keep_freed_memory
 from doorstate.evaluation.table import Table
-from doorstate.inference.predictor import Prediction, Predictor
+from doorstate.inference.backends.torch_backend import TorchBackend
+from doorstate.inference.network_predictor import NetworkPredictor
+from doorstate.inference.prediction import Prediction
 from doorstate.inference.rule_predictor import RulePredictor
 from doorstate.networks import create_network
 from doorstate.networks.card import WeightsCard
@@ -29,10 +31,12 @@ def measure(count: int, points: int, threads: int, repeats: int, progress: Progr
     keep_freed_memory()  # as `doorstate predict` does
     clouds = raw_clouds(count)
     methods: dict[str, Callable[[Points], Prediction]] = {
-        name: RulePredictor.load(name) for name in list_rules()
+        name: RulePredictor.from_name(name) for name in list_rules()
     }
     for name in BESIDE:
-        methods[name] = Predictor(create_network(name), WeightsCard(network=name, num_points=points), points)
+        methods[name] = NetworkPredictor(
+            TorchBackend(create_network(name), WeightsCard(network=name, num_points=points))
+        )
     rows = []
     with use_threads(threads):
         for done, (name, predict) in enumerate(methods.items()):

@@ -11,12 +11,16 @@ from benchmarks.clouds import comparison_frames
 from benchmarks.store import Group
 from doorstate._jobs import Progress
 from doorstate.evaluation.table import Table, number
-from doorstate.inference.predictor import Prediction, Predictor
+from doorstate.inference.network_predictor import NetworkPredictor
+from doorstate.inference.prediction import Prediction
 
 
 def measure(network: str, count: int, progress: Progress) -> list[Group]:
     """Answers of packaged weights to doors they were not trained on, with both samplings."""
-    samplings = {"some": Predictor.load(network), "all": Predictor.load(network, thin=False)}
+    samplings = {
+        "some": NetworkPredictor.from_weights(network),
+        "all": NetworkPredictor.from_weights(network, thin=False),
+    }
     rows = []
     for row, frame in comparison_frames(count, progress):
         answers = {name: predict(frame.points) for name, predict in samplings.items()}

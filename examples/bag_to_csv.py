@@ -21,7 +21,7 @@ from doorstate.io.readers import ReadOptions
 def main(recording: Path, table: Path) -> None:
     """Write the changes."""
     # It knows the door of make_bag.py; for doors of the world leave the name out.
-    predictor = Predictor.load("ogurob-pointnet2", points=512)
+    predictor = Predictor.load("ogurob-pointnet2", num_points=512)
     before = None
     with open_bag(recording) as bag, table.open("w", newline="", encoding="utf-8") as stream:
         rows = csv.writer(stream)

@@ -34,7 +34,7 @@ def main(root: Path) -> None:
         f"{'rule':16}{'right':>6}{'wrong':>6}{'no answer':>11}{'ms':>6}   called open by mistake: gate, no gate"
     )
     for name in list_rules():
-        gated, careless = RulePredictor.load(name), RulePredictor(create_rule(name), gate=None)
+        gated, careless = RulePredictor.from_name(name), RulePredictor(create_rule(name), gate=None)
         verdicts: Counter[str] = Counter()
         milliseconds = []
         by_mistake = [0, 0]

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from doorstate.inference.rule_predictor import RulePredictor
+from doorstate import Predictor
 from doorstate.io.camera import read_intrinsics
 from doorstate.io.depth import depth_to_points
 
@@ -27,7 +27,7 @@ def main(picture: Path, camera: Path) -> None:
     cloud = depth_to_points(stored * 0.001, intrinsics, roll_deg=0)  # 90 if the camera lies on its right side
     print(f"measured: {np.isfinite(cloud[..., 0]).mean():.0%} of the pixels")
 
-    prediction = RulePredictor.load("wall_leaf_angle")(cloud)
+    prediction = Predictor.load(rule="wall_leaf_angle")(cloud)
     if prediction.state is None:
         print(f"unknown: {prediction.reason}")
     else:

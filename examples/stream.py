@@ -13,9 +13,8 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from doorstate import StateFilter, wait_for
+from doorstate import Predictor, StateFilter, wait_for
 from doorstate.errors import DoorstateError
-from doorstate.inference.rule_predictor import RulePredictor
 from doorstate.io.bags import open_bag
 from doorstate.types import Points
 
@@ -30,7 +29,7 @@ def stamped_clouds(recording: Path) -> Iterator[tuple[float, Points]]:
 
 def main(recording: Path) -> int:
     """Print what changes, then wait; give the exit code."""
-    predictor = RulePredictor.load("plane_state")  # or Predictor.load(budget_ms=33)
+    predictor = Predictor.load(rule="plane_state")  # or Predictor.load(budget_ms=33)
     state_filter = StateFilter()
     first_s = before = None
     for stamp_s, cloud in stamped_clouds(recording):

@@ -19,7 +19,8 @@ from doorstate.dataset.prepare import Preparation, prepare_dataset
 from doorstate.dataset.store import PreparedDataset
 from doorstate.networks import create_network
 from doorstate.networks.weights import WeightsCard, save_weights
-from doorstate.simulation.generate import PRESETS
+from doorstate.simulation.frames import Frame, replay
+from doorstate.simulation.generate import PRESETS, draw_pose
 from doorstate.simulation.run import simulate_dataset
 from doorstate.simulation.scene_rows import SCENE_PRESETS
 from doorstate.simulation.sensor import DepthCamera
@@ -56,6 +57,12 @@ def small_dataset(simulated_folder: Path, tmp_path_factory: pytest.TempPathFacto
     return prepare_dataset(
         Preparation(simulated_folder, CloudSpec(num_points=SMALL_POINTS)), folder, workers=1
     ).dataset
+
+
+@pytest.fixture(scope="session")
+def frames() -> list[Frame]:
+    """A closed, a semi-open and an open door from one pose."""
+    return [replay(row) for row in draw_pose(PRESETS["ogurob"], 3, 700)]
 
 
 @pytest.fixture(scope="session")

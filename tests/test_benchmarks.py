@@ -28,7 +28,7 @@ from benchmarks.onnx import onnx_table
 from doorstate._jobs import no_progress
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import ConfigError, RunError
-from doorstate.inference.predictor import Prediction
+from doorstate.inference.prediction import Prediction
 from doorstate.networks.packaged import packaged_weights
 from doorstate.rules import list_rules
 from doorstate.types import DoorState

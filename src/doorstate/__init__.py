@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from doorstate.inference.gate import Gate
-    from doorstate.inference.predictor import Prediction, Predictor
+    from doorstate.inference.prediction import Prediction
+    from doorstate.inference.predictor import Predictor
     from doorstate.inference.stream import StateFilter, wait_for
     from doorstate.io.readers import ReadOptions, read_cloud
     from doorstate.networks import create_network, list_networks
@@ -36,7 +37,7 @@ __all__ = [
 _HOME = {
     "DoorState": "doorstate.types",
     "Gate": "doorstate.inference.gate",
-    "Prediction": "doorstate.inference.predictor",
+    "Prediction": "doorstate.inference.prediction",
     "Predictor": "doorstate.inference.predictor",
     "ReadOptions": "doorstate.io.readers",
     "StateFilter": "doorstate.inference.stream",

@@ -143,7 +143,7 @@ def test_folders_of_states_are_enough_and_the_same_files_come_out_twice(
         (("--layout", "kitti"), "no layout 'kitti'"),
         (("--layout", "deepdoors2", "--roll", "90"), "--layout says how its files are read"),
         (("--all",), "--all is for the page of --out"),
-        (("--rule", "plane_state", "--points", "512"), "a rule looks at all points"),
+        (("--rule", "plane_state", "--points", "512"), "a rule evaluates all points"),
         (("--out", "index.csv/report"), "index.csv/report/frames.html: cannot be written"),
     ],
 )

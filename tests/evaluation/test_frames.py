@@ -22,7 +22,7 @@ from doorstate.viewer.frame_page import choose_frames
 
 @pytest.fixture(scope="module")
 def methods(viewer: Predictor) -> Methods:
-    return {"net": viewer, "plane_state": RulePredictor.load("plane_state")}
+    return {"net": viewer, "plane_state": RulePredictor.from_name("plane_state")}
 
 
 def broken() -> Points:

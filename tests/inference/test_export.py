@@ -13,10 +13,10 @@ import torch
 from doorstate.clouds.preparation import CloudSpec, normalize, prepare_cloud
 from doorstate.errors import ExportError
 from doorstate.inference import export as onnx_export
+from doorstate.inference.backends.onnx_backend import OnnxBackend
+from doorstate.inference.backends.torch_backend import TorchBackend
 from doorstate.inference.export import TOLERANCE, export_onnx
-from doorstate.inference.onnx_backend import OnnxBackend
 from doorstate.inference.reference_clouds import LabelledClouds
-from doorstate.inference.torch_backend import TorchBackend
 from doorstate.networks import create_network, list_networks
 from doorstate.networks.base import PointNetwork
 from doorstate.networks.card import WeightsCard
@@ -62,12 +62,12 @@ def test_the_file_answers_as_torch_does(name: str, clouds: LabelledClouds, tmp_p
     assert comparison.largest <= TOLERANCE == comparison.allowed
     assert comparison.right == comparison.right_in_torch
     exported = OnnxBackend(path)
-    expected = TorchBackend(network, 0.1).ask(clouds.points)[0]
+    expected = TorchBackend(network, card_of(name))(clouds.points).probabilities
     assert np.ptp(expected, axis=0).max() > 0.1, "answers that are all alike compare nothing"
     for batch in (clouds.points[:1], clouds.points[1:6]):
-        found = exported.ask(batch)[0]
+        found = exported(batch)[0]
         np.testing.assert_allclose(found.sum(1), 1, atol=1e-5)
-    np.testing.assert_allclose(exported.ask(clouds.points)[0], expected, atol=TOLERANCE)
+    np.testing.assert_allclose(exported(clouds.points)[0], expected, atol=TOLERANCE)
 
     model = onnx.load(path)
     onnx.checker.check_model(model, full_check=True)
@@ -91,13 +91,13 @@ def test_heads_are_outputs_of_the_file(clouds: LabelledClouds, tmp_path: Path) -
     comparison = export_onnx(tmp_path / "network.onnx", network.eval(), card, clouds)
     assert comparison.largest <= TOLERANCE
     exported = OnnxBackend(tmp_path / "network.onnx")
-    _, expected = TorchBackend(network, 0.1).ask(clouds.points)
-    probabilities, columns = exported.ask(clouds.points)
+    _, expected = TorchBackend(network, card)(clouds.points)
+    probabilities, columns = exported(clouds.points)
     assert list(columns) == list(expected)
     for name, values in expected.items():
         assert np.ptp(values) > 0 or name.endswith("width_m")  # widths are cut at 0
         np.testing.assert_allclose(columns[name], values, atol=0.01 if name.endswith("_deg") else 1e-4)
-    assert np.array_equal(probabilities, exported.ask(clouds.points)[0])
+    assert np.array_equal(probabilities, exported(clouds.points)[0])
     outputs = [each.name for each in onnx.load(tmp_path / "network.onnx").graph.output]
     assert outputs == ["probabilities", *HEADS]
 

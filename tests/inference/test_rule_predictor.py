@@ -20,13 +20,13 @@ def wall() -> Points:
 
 @pytest.mark.parametrize("name", list_rules())
 def test_says_what_its_rule_says(name: str) -> None:
-    answer, said = create_rule(name)(wall()), RulePredictor.load(name)(wall())
+    answer, said = create_rule(name)(wall()), RulePredictor.from_name(name)(wall())
     assert (said.state, said.reason, said.opening_angle_deg) == (
         answer.state,
         answer.reason,
         answer.opening_angle_deg,
     )
-    assert said.points == 320 * 240
+    assert said.num_points == 320 * 240
     assert said.probabilities == {
         state: float(answer.state is not None and state == answer.state.label) for state in STATES
     }
@@ -36,14 +36,16 @@ def test_says_what_its_rule_says(name: str) -> None:
 def test_a_pane_of_glass_is_refused_by_the_gate(name: str) -> None:
     cloud = wall()
     cloud[:, 120:200] = np.nan
-    said = RulePredictor.load(name)(cloud)
+    said = RulePredictor.from_name(name)(cloud)
     assert said.state is None
-    assert "glass or missing data" in said.reason
+    assert said.abstention is not None
+    assert said.abstention.code == "hole"
     rule = create_rule(name)
     assert RulePredictor(rule, gate=None)(cloud).reason == rule(cloud).reason
 
 
 def test_nothing_measured_is_unknown() -> None:
-    said = RulePredictor.load("angle_bins")(np.full((10, 10, 3), np.nan, np.float32))
-    assert (said.state, said.points) == (None, 0)
-    assert "nothing was measured" in said.reason
+    said = RulePredictor.from_name("angle_bins")(np.full((10, 10, 3), np.nan, np.float32))
+    assert (said.state, said.num_points) == (None, 0)
+    assert said.abstention is not None
+    assert said.abstention.code == "too_few_points"

@@ -13,12 +13,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from doorstate.errors import CloudContentError, ConfigError
-from doorstate.inference.predictor import Prediction
+from doorstate.inference.abstention import Abstention
+from doorstate.inference.prediction import Prediction
 from doorstate.inference.stream import FilteredState, StateFilter, wait_for
-from doorstate.types import STATES, DoorState, Points
+from doorstate.types import DoorState, Points
 
 OPEN, CLOSED, SEMI_OPEN = DoorState.OPEN, DoorState.CLOSED, DoorState.SEMI_OPEN
-UNKNOWN = Prediction(None, dict.fromkeys(STATES, 0.0), 0, 0.0, "glass or missing data")
+UNKNOWN = Prediction.abstain(Abstention("hole", {"share": 0.3, "free_reach_m": 4.0}))
 
 
 def says(state: DoorState, probability: float = 0.9) -> Prediction:

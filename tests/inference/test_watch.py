@@ -15,7 +15,9 @@ import pytest
 from numpy.typing import NDArray
 
 from doorstate.errors import ConfigError, WeightsError
-from doorstate.inference.predictor import Prediction, Predictor
+from doorstate.inference.network_predictor import NetworkPredictor
+from doorstate.inference.prediction import Prediction
+from doorstate.inference.predictor import Predictor
 from doorstate.inference.rule_predictor import RulePredictor
 from doorstate.inference.stream import wait_for
 from doorstate.inference.watch import DoorReport, DoorWatch
@@ -30,23 +32,23 @@ OPTICAL = "camera_depth_optical_frame"
 START_NS = 1_700_000_000_123_456_789
 
 
-class Remembering(Predictor):
-    """Asks the network once about the same cloud."""
+class CachedPredictor(NetworkPredictor):
+    """Predictor that runs its network once for the same cloud."""
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
-        self._said: dict[bytes, Prediction] = {}
+        self._predictions: dict[bytes, Prediction] = {}
 
     def __call__(self, points: Points) -> Prediction:
         content = points.tobytes()
-        if content not in self._said:
-            self._said[content] = super().__call__(points)
-        return self._said[content]
+        if content not in self._predictions:
+            self._predictions[content] = super().__call__(points)
+        return self._predictions[content]
 
 
 @pytest.fixture(scope="module")
 def predictor() -> Predictor:
-    return Remembering.load("ogurob-pointnet2", POINTS)  # the door of these frames
+    return CachedPredictor.from_weights("ogurob-pointnet2", num_points=POINTS)  # the door of these frames
 
 
 @pytest.fixture(scope="module")
@@ -213,7 +215,7 @@ def test_what_cannot_be_read_is_unknown_and_ends_nothing(predictor: Predictor, c
     ("camera_hz", "max_hz", "answers"), [(30, 10, 10), (15, 10, 10), (9, 10, 9), (30, 0, 30)]
 )
 def test_no_more_answers_than_asked_for_and_no_fewer(camera_hz: int, max_hz: float, answers: int) -> None:
-    watch = DoorWatch(WatchSettings(max_hz=max_hz), RulePredictor.load("depth_region"))
+    watch = DoorWatch(WatchSettings(max_hz=max_hz), RulePredictor.from_name("depth_region"))
     due = [watch.is_due(1000 + number / camera_hz) for number in range(10 * camera_hz)]
     assert sum(due) == pytest.approx(10 * answers, abs=1)
 
@@ -259,7 +261,7 @@ def test_parameters_that_exclude_each_other_are_errors() -> None:
     for both in ({"points": 512}, {"budget_ms": 33.0}):
         with pytest.raises(ConfigError, match="leave points and time budget out"):
             parse_settings({"rule": "plane_state"} | both).load_predictor()
-    with pytest.raises(ConfigError, match="one answers"):
+    with pytest.raises(ConfigError, match="one of them"):
         parse_settings({"rule": "plane_state", "weights": "door.onnx"}).load_predictor()
     with pytest.raises(ConfigError, match="give one of them"):
         parse_settings({"points": 512, "budget_ms": 33}).load_predictor()

@@ -204,7 +204,7 @@ def test_a_closed_door_is_said_to_be_closed_as_the_library_says_it(
     assert {stamp_of(each.header) for each in robot.answers("closed")} <= sent
     assert answer.header.frame_id == FRAME_ID
     assert (answer.status[0].level, answer.status[0].message) == (DiagnosticStatus.OK, "closed")
-    expected = Predictor.load(points=POINTS)(points_from_optical(to_optical(clouds[0])))
+    expected = Predictor.load(num_points=POINTS)(points_from_optical(to_optical(clouds[0])))
     said = {name: float(values(answer)[name]) for name in expected.probabilities}
     assert said == pytest.approx(expected.probabilities, abs=1e-4)
 

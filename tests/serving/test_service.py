@@ -29,7 +29,9 @@ import uvicorn
 from PIL import Image
 
 import doorstate
-from doorstate.inference.predictor import Predictor
+from doorstate.inference.abstention import Abstention
+from doorstate.inference.backends.torch_backend import TorchBackend
+from doorstate.inference.network_predictor import NetworkPredictor
 from doorstate.inference.rule_predictor import RulePredictor
 from doorstate.io.pcd import write_pcd
 from doorstate.io.readers import CLOUD_SUFFIXES
@@ -73,7 +75,7 @@ class Stopped:
 @contextmanager
 def serving(gate: Any = None, rule: str = "", **limits: Any) -> Iterator[httpx.Client]:
     """A client of the service, run by Uvicorn in a thread of this process."""
-    answering = RulePredictor.load(rule) if rule else Predictor(NETWORK, CARD, 256, gate=gate)
+    answering = RulePredictor.from_name(rule) if rule else NetworkPredictor(TorchBackend(NETWORK, CARD), gate=gate)
     app = create_app(answering, Limits(**{"workers": 1} | limits))
     listening = socket.create_server(("127.0.0.1", 0))
     config = uvicorn.Config(
@@ -124,10 +126,10 @@ def test_the_answer_is_that_of_the_command(client: httpx.Client, run: Run, tmp_p
 
 
 def test_a_refused_cloud_has_a_reason_and_no_state() -> None:
-    with serving(gate=lambda cloud: "something is before the camera") as client:
+    with serving(gate=lambda cloud: Abstention("too_near", {"median_m": 0.2})) as client:
         answer = client.post("/predict?format=npy", content=NPY).raise_for_status().json()
     assert answer["state"] is None
-    assert answer["reason"] == "something is before the camera"
+    assert "0.20 m" in answer["reason"]
     always = {"state", "probabilities", "points", "milliseconds", "reason"}
     assert set(answer) == always <= set(PredictionResponse.model_fields)
 

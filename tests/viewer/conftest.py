@@ -8,11 +8,11 @@ import pytest
 import torch
 
 from doorstate.errors import CloudReadError
-from doorstate.inference.predictor import Predictor
+from doorstate.inference.backends.torch_backend import TorchBackend
+from doorstate.inference.network_predictor import NetworkPredictor
 from doorstate.networks import create_network
 from doorstate.networks.weights import WeightsCard
-from doorstate.simulation.frames import Frame, replay
-from doorstate.simulation.generate import PRESETS, draw_pose
+from doorstate.simulation.frames import Frame
 from doorstate.types import STATES
 from doorstate.viewer.cloud_page import Entry, make_entry
 from doorstate.viewer.named_clouds import NamedCloud
@@ -21,17 +21,11 @@ POINTS = 300
 
 
 @pytest.fixture(scope="module")
-def predictor() -> Predictor:
+def predictor() -> NetworkPredictor:
     """Untrained PointNet, because it is quick."""
     torch.manual_seed(0)
     card = WeightsCard(network="pointnet", num_points=POINTS)
-    return Predictor(create_network("pointnet"), card, POINTS)
-
-
-@pytest.fixture(scope="module")
-def frames() -> list[Frame]:
-    """A closed, a semi-open and an open door from one pose."""
-    return [replay(row) for row in draw_pose(PRESETS["ogurob"], 3, 700)]
+    return NetworkPredictor(TorchBackend(create_network("pointnet"), card))
 
 
 @pytest.fixture(scope="module")
@@ -52,5 +46,5 @@ def clouds(frames: list[Frame]) -> list[NamedCloud]:
 
 
 @pytest.fixture(scope="module")
-def entries(predictor: Predictor, clouds: list[NamedCloud]) -> list[Entry]:
+def entries(predictor: NetworkPredictor, clouds: list[NamedCloud]) -> list[Entry]:
     return [make_entry(predictor, cloud) for cloud in clouds]

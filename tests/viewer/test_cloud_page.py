@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from doorstate.clouds.preparation import CloudSpec, prepare_cloud
-from doorstate.inference.predictor import Predictor
+from doorstate.inference.network_predictor import NetworkPredictor
 from doorstate.inference.rule_predictor import RulePredictor
 from doorstate.types import Part
 from doorstate.viewer.cloud_page import Entry, make_entry, render_cloud_page
@@ -24,7 +24,7 @@ def decoded(text: str, kind: str) -> np.ndarray:
 
 
 def test_entry_holds_the_input_points_of_the_network(
-    predictor: Predictor, clouds: list[NamedCloud], entries: list[Entry]
+    predictor: NetworkPredictor, clouds: list[NamedCloud], entries: list[Entry]
 ) -> None:
     prepared = prepare_cloud(clouds[1].cloud, CloudSpec(num_points=300, thin=True))
     encoded = entries[1]["cloud"]
@@ -34,7 +34,7 @@ def test_entry_holds_the_input_points_of_the_network(
     assert parts.tolist() == clouds[1].parts[prepared.indices].tolist()  # type: ignore[index]
     assert Part.LEAF in parts
     channels = decoded(entries[1]["channels"], "<u2") / 32
-    counts = critical_points(predictor.network, prepared.points)
+    counts = critical_points(predictor.backend.network, prepared.points)
     assert channels.tolist() == counts.tolist()  # type: ignore[union-attr]
     prediction = predictor(clouds[1].cloud)  # type: ignore[arg-type]
     values = entries[1]["prediction"]
@@ -53,7 +53,7 @@ def test_entries_without_parts_state_or_cloud(entries: list[Entry]) -> None:
 
 
 def test_entry_of_a_rule_holds_its_detections(clouds: list[NamedCloud]) -> None:
-    rule = RulePredictor.load("plane_state")
+    rule = RulePredictor.from_name("plane_state")
     entry = make_entry(rule, clouds[1])
     detections = rule(clouds[1].cloud).detections  # type: ignore[arg-type]
     assert [shape["name"] for shape in entry["shapes"]] == [shape.name for shape in detections]
@@ -62,9 +62,9 @@ def test_entry_of_a_rule_holds_its_detections(clouds: list[NamedCloud]) -> None:
     assert len(decoded(entry["cloud"]["points"], "<i2")) == 3 * 4096
 
 
-def test_entry_holds_at_most_4096_points(predictor: Predictor) -> None:
+def test_entry_holds_at_most_4096_points(predictor: NetworkPredictor) -> None:
     cloud = np.random.default_rng(0).uniform(1, 3, (6000, 3)).astype(np.float32)
-    many = Predictor(predictor.network, predictor.card, 5000, gate=None)
+    many = NetworkPredictor(predictor.backend, 5000, gate=None)
     entry = make_entry(many, NamedCloud("many", cloud, np.zeros(6000, np.uint8)))
     assert entry["prediction"]["points"] == 5000
     assert len(decoded(entry["cloud"]["points"], "<i2")) == 3 * 4096
@@ -72,7 +72,7 @@ def test_entry_holds_at_most_4096_points(predictor: Predictor) -> None:
     assert len(decoded(entry["channels"], "<u2")) == 4096
 
 
-def test_page_is_self_contained_and_escapes_text(predictor: Predictor, entries: list[Entry]) -> None:
+def test_page_is_self_contained_and_escapes_text(predictor: NetworkPredictor, entries: list[Entry]) -> None:
     hostile = "</script><img src=http://door.example/x>"
     page = render_cloud_page(predictor, [entries[0] | {"name": hostile}])
     assert hostile not in page

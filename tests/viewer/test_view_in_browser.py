@@ -98,7 +98,7 @@ def test_page_shows_clouds_one_after_the_other(
 
 def test_detections_are_drawn(browser: Browser, clouds: list[NamedCloud], tmp_path: Path) -> None:
     page, errors = browser
-    rule = RulePredictor.load("plane_state")
+    rule = RulePredictor.from_name("plane_state")
     path = tmp_path / "rule.html"
     path.write_text(render_cloud_page(rule, [make_entry(rule, clouds[1])]), encoding="utf-8")
     page.goto(path.as_uri())

@@ -134,7 +134,7 @@ def _methods(
     points: int | None,
 ) -> Methods:
     """Return the predictors by name; the default network if none is given."""
-    from doorstate.inference.loading import load_predictor
+    from doorstate.cli.predictors import load_predictor
     from doorstate.inference.predictor import DEFAULT_NETWORK
 
     choices: list[tuple[str | None, Path | None, str | None]] = [

@@ -33,7 +33,6 @@ from doorstate.errors import ConfigError, DoorstateError
 
 if TYPE_CHECKING:
     from doorstate.inference.predictor import Predictor
-    from doorstate.inference.rule_predictor import RulePredictor
     from doorstate.io.readers import ReadOptions
 
 
@@ -81,7 +80,7 @@ def predict(
       doorstate predict --bag run.bag --topic /camera/depth/points --frame optical --out run.csv
     """
     from doorstate.cli.predict_bag import predict_bag
-    from doorstate.inference.loading import load_predictor
+    from doorstate.cli.predictors import load_predictor
     from doorstate.io.readers import find_clouds
 
     check_source(files, bag)
@@ -101,7 +100,7 @@ def predict(
 
 
 def _predict_files(
-    predictor: Predictor | RulePredictor,
+    predictor: Predictor,
     paths: list[Path],
     options: ReadOptions,
     out: Path | None,
@@ -121,13 +120,13 @@ def _predict_files(
         raise typer.Exit(1)
 
 
-def _predict_file(predictor: Predictor | RulePredictor, path: Path, options: ReadOptions) -> dict[str, Any]:
+def _predict_file(predictor: Predictor, path: Path, options: ReadOptions) -> dict[str, Any]:
     from doorstate.inference.serialization import prediction_to_dict, require_points
     from doorstate.io.readers import read_cloud
 
     # A file name may hold bytes that are not text and cannot be printed.
     row = {"file": str(path).encode(errors="backslashreplace").decode()}
     try:
-        return row | prediction_to_dict(require_points(predictor(read_cloud(path, options))))
+        return row | prediction_to_dict(require_points(predictor(read_cloud(path, options))), format_flag)
     except DoorstateError as error:
         return row | {"error": error.describe(format_flag, with_path=False)}

@@ -15,13 +15,12 @@ from doorstate.errors import CloudReadError, DoorstateError
 
 if TYPE_CHECKING:
     from doorstate.inference.predictor import Predictor
-    from doorstate.inference.rule_predictor import RulePredictor
     from doorstate.io.bags import BagTopic, StampedCloud
     from doorstate.io.readers import ReadOptions
 
 
 def predict_bag(
-    load: Callable[[], Predictor | RulePredictor],
+    load: Callable[[], Predictor],
     path: Path,
     options: ReadOptions,
     topic: str | None,
@@ -76,7 +75,7 @@ def warn_about_frame(
         yield message
 
 
-def _rows(predictor: Predictor | RulePredictor, clouds: Iterable[StampedCloud]) -> Iterator[dict[str, Any]]:
+def _rows(predictor: Predictor, clouds: Iterable[StampedCloud]) -> Iterator[dict[str, Any]]:
     """Yield a row for each message; a bag that is damaged from somewhere on ends with an error row."""
     from doorstate.inference.serialization import prediction_to_dict
 
@@ -86,7 +85,7 @@ def _rows(predictor: Predictor | RulePredictor, clouds: Iterable[StampedCloud]) 
             try:
                 if isinstance(cloud, DoorstateError):
                     raise cloud
-                row |= prediction_to_dict(predictor(cloud))
+                row |= prediction_to_dict(predictor(cloud), format_flag)
             except DoorstateError as error:
                 row["error"] = error.describe(format_flag, with_path=False)
             yield row

@@ -60,7 +60,8 @@ def _measure_latency(settings: ResolutionStudy, folder: Path) -> None:
     from doorstate.cli.console import progress_bar
     from doorstate.dataset.store import open_dataset
     from doorstate.evaluation.resolution import LATENCY
-    from doorstate.inference.predictor import Predictor, median_milliseconds
+    from doorstate.inference.budget import median_milliseconds
+    from doorstate.inference.predictor import Predictor
     from doorstate.training.run_folder import AS_TRAINED, run_of
 
     keep_freed_memory()  # as doorstate predict does
@@ -70,7 +71,7 @@ def _measure_latency(settings: ResolutionStudy, folder: Path) -> None:
     with progress_bar("Timing") as progress:
         for done, (network, points) in enumerate(cases, 1):
             weights = run_of(folder / f"{AS_TRAINED}-{points}", network, 0).weights
-            median_ms = median_milliseconds(Predictor.load(weights, points), clouds, _REPEATS)
+            median_ms = median_milliseconds(Predictor.load(weights, num_points=points), clouds, _REPEATS)
             rows.append({"network": network, "points": str(points), "median_ms": f"{median_ms:.2f}"})
             progress(done, len(cases))
     write_csv(folder / LATENCY, rows)

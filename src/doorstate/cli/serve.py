@@ -50,7 +50,7 @@ def serve(
     except ImportError as error:
         raise missing_extra("serve", "fastapi", "uvicorn") from error
     from doorstate._jobs import default_workers
-    from doorstate.inference.loading import load_predictor
+    from doorstate.cli.predictors import load_predictor
 
     workers = workers or default_workers()
     limits = Limits(int(max_megabytes * 2**20), timeout_s, queue, workers)

@@ -100,7 +100,7 @@ def view(
     """
     from doorstate._files import check_writable
     from doorstate.cli.view_output import show_live, show_page
-    from doorstate.inference.loading import load_predictor
+    from doorstate.cli.predictors import load_predictor
 
     check_source(files, bag)
     if bag is None and (topic, camera_info_topic) != (None, None):

@@ -17,14 +17,13 @@ from doorstate.cli.flags import format_flag
 
 if TYPE_CHECKING:
     from doorstate.inference.predictor import Predictor
-    from doorstate.inference.rule_predictor import RulePredictor
     from doorstate.viewer.named_clouds import NamedCloud
 
 _LARGE_PAGE_BYTES = 50_000_000  # browsers take seconds to open it
 
 
 def show_page(
-    predictor: Predictor | RulePredictor,
+    predictor: Predictor,
     clouds: Iterable[NamedCloud],
     total: int,
     out: Path | None,
@@ -70,7 +69,7 @@ def show_page(
 
 
 def show_live(
-    predictor: Predictor | RulePredictor, clouds: Iterable[NamedCloud], port: int, open_browser: bool
+    predictor: Predictor, clouds: Iterable[NamedCloud], port: int, open_browser: bool
 ) -> None:
     """Serve a page that shows clouds as they arrive, until Ctrl-C.
 

@@ -11,11 +11,12 @@ from doorstate._jobs import Progress, no_progress
 from doorstate.dataset.labelled import LabelledFrame, check_column
 from doorstate.errors import DoorstateError
 from doorstate.evaluation.frame_metrics import Said, is_wrong, measure
-from doorstate.inference.predictor import Prediction, Predictor
-from doorstate.inference.rule_predictor import RulePredictor
+from doorstate.inference.abstention import Abstention
+from doorstate.inference.prediction import Prediction
+from doorstate.inference.predictor import Predictor
 from doorstate.types import ABSTAINED, STATES
 
-Methods = Mapping[str, Predictor | RulePredictor]
+Methods = Mapping[str, Predictor]
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +100,7 @@ def ask(methods: Methods, frames: Sequence[LabelledFrame], progress: Progress = 
                 try:
                     said = method(cloud)
                 except DoorstateError as error:
-                    said = Prediction.abstain(str(error))
+                    said = Prediction.abstain(Abstention.from_error(error))
                 predictions[name].append(said)
         progress(number + 1, len(frames))
     return Asked(

@@ -23,14 +23,14 @@ from doorstate._files import atomic_path
 from doorstate._jobs import Progress, no_progress
 from doorstate.clouds.preparation import SCALE_M
 from doorstate.errors import ExportError, missing_extra, summarize_exception
-from doorstate.inference.onnx_backend import CARD, INPUT, OUTPUT, OnnxBackend, heads_told
+from doorstate.inference.backends.base import Outputs
+from doorstate.inference.backends.onnx_backend import CARD_KEY, INPUT, OUTPUT, OnnxBackend, head_names
+from doorstate.inference.backends.torch_backend import TorchBackend
 from doorstate.inference.reference_clouds import LabelledClouds
-from doorstate.inference.torch_backend import TorchBackend
 from doorstate.networks.base import PointNetwork
 from doorstate.networks.card import WeightsCard
 from doorstate.networks.head_layers import head_outputs
 from doorstate.networks.heads import HEADS, STATE
-from doorstate.networks.heads.spec import Columns
 from doorstate.types import STATES, Points
 
 if TYPE_CHECKING:
@@ -127,7 +127,7 @@ def export_onnx(
                     _quantize(temporary)
                     model = onnx.load(temporary)
                 metadata = {
-                    CARD: card.model_copy(
+                    CARD_KEY: card.model_copy(
                         update={"num_points": num_points, "default_points": None}
                     ).model_dump_json()
                 }
@@ -169,15 +169,15 @@ def compare_with_torch(
         progress: called after every three clouds.
     """
     points, labels = clouds
-    exported, original = OnnxBackend(path), TorchBackend(network, card.temperature)
+    exported, original = OnnxBackend(path), TorchBackend(network, card)
     told: list[NDArray[np.float32]] = []
     expected: list[NDArray[np.float32]] = []
     progress(0, len(points))
     for alone in range(0, len(points), 3):
         for some in (points[alone : alone + 1], points[alone + 1 : alone + 3]):
             if len(some):
-                told.append(_in_columns(exported.ask(some)))
-                expected.append(_in_columns(original.ask(some)))
+                told.append(_in_columns(exported(some)))
+                expected.append(_in_columns(original(some)))
         progress(min(alone + 3, len(points)), len(points))
     found, said = np.concatenate(told), np.concatenate(expected)
     largest, allowed = float(np.abs(found - said).max()), TOLERANCE
@@ -188,24 +188,24 @@ def compare_with_torch(
     return Comparison(largest, allowed, len(points), right, right_in_torch)
 
 
-def _in_columns(said: tuple[NDArray[np.float32], Columns]) -> NDArray[np.float32]:
+def _in_columns(outputs: Outputs) -> NDArray[np.float32]:
     """(B, 3 + heads) probabilities, and what heads say, angles in radians so that their digits weigh the same."""
-    probabilities, columns = said
+    probabilities, columns = outputs
     heads = [np.radians(each) if name.endswith("_deg") else each for name, each in columns.items()]
     return np.column_stack([probabilities, *heads]).astype(np.float32)
 
 
 def rounding_in_torch(network: PointNetwork, card: WeightsCard, points: Points) -> float:
     """How far an answer moves when the last digits change: those of the points, or all by float64."""
-    original, rng = TorchBackend(network, card.temperature), np.random.default_rng(0)
-    exact = TorchBackend(copy.deepcopy(network).double(), card.temperature)
+    original, rng = TorchBackend(network, card), np.random.default_rng(0)
+    exact = TorchBackend(copy.deepcopy(network).double(), card)
     furthest = 0.0
     for cloud in points:
-        said = _in_columns(original.ask(cloud[None]))
-        others = [_in_columns(exact.ask(cloud[None], np.float64))]
+        said = _in_columns(original(cloud[None]))
+        others = [_in_columns(exact(cloud[None]))]
         for _ in range(_JITTERS):
             jitter = np.float32(1) + rng.choice(_LAST_DIGIT, cloud.shape)
-            others.append(_in_columns(original.ask((cloud * jitter)[None])))
+            others.append(_in_columns(original((cloud * jitter)[None])))
         furthest = max(furthest, *(float(np.abs(said - other).max()) for other in others))
     return furthest
 
@@ -222,7 +222,7 @@ def _model(network: PointNetwork, card: WeightsCard, num_points: int, opset: int
         opset_version=opset,
         dynamic_shapes=({0: torch.export.Dim("batch")},),
         input_names=[INPUT],
-        output_names=[OUTPUT, *heads_told(card)],
+        output_names=[OUTPUT, *head_names(card)],
         verbose=False,
     )
     assert program is not None  # since `dynamo`

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A rule behind the interface of a `Predictor`: no weights, no training, and no answer where it has none."""
+"""Rule behind the interface of a predictor: no weights, no training, and all points are evaluated."""
 
 from __future__ import annotations
 
@@ -9,19 +9,22 @@ from typing import Any
 import numpy as np
 
 from doorstate.clouds.preparation import check_one_cloud
-from doorstate.inference.gate import Gate
-from doorstate.inference.predictor import DEFAULT_GATE, Prediction
+from doorstate.errors import TooFewPointsError
+from doorstate.inference.abstention import Abstention
+from doorstate.inference.gate import DEFAULT_GATE, Gate
+from doorstate.inference.prediction import Prediction
+from doorstate.inference.predictor import Predictor
 from doorstate.rules import create_rule
-from doorstate.rules.base import Rule, RuleResult, measured
+from doorstate.rules.base import Rule, measured
 from doorstate.types import STATES, Points
 
 
-class RulePredictor:
-    """A rule of `doorstate.rules.list_rules()`.
+class RulePredictor(Predictor):
+    """Rule of `doorstate.rules.list_rules()`.
 
     Args:
-        rule: which one.
-        gate: as of a `Predictor`: a rule would take missing data for a free way as well.
+        rule: method to apply.
+        gate: rejects clouds in which too much is missing; a rule would take missing data for a free way as well.
     """
 
     def __init__(self, rule: Rule[Any], *, gate: Gate | None = DEFAULT_GATE) -> None:
@@ -29,44 +32,53 @@ class RulePredictor:
         self.gate = gate
 
     @classmethod
-    def load(cls, name: str, *, gate: Gate | None = DEFAULT_GATE) -> RulePredictor:
-        """A rule by name, with its default parameters.
-
-        Args:
-            name: of `doorstate.rules.list_rules()`.
-            gate: as of the class.
+    def from_name(cls, name: str, *, gate: Gate | None = DEFAULT_GATE) -> RulePredictor:
+        """Create a rule with its default parameters.
 
         Raises:
             ConfigError: no such rule.
         """
         return cls(create_rule(name), gate=gate)
 
-    def __str__(self) -> str:
-        return f"rule {self.rule.name}"
+    @property
+    def name(self) -> str:
+        return self.rule.name
 
-    def __call__(self, points: Points) -> Prediction:
-        """State of the door in a cloud, or none with the reason; a given state has probability 1.
+    def __str__(self) -> str:
+        return f"rule {self.name}"
+
+    def __call__(self, cloud: Points) -> Prediction:
+        """Predict the state of the door in a cloud, or abstain with a reason; a state has probability 1.
 
         Args:
-            points: (N, 3) or organized (H, W, 3) metres, x forward, y left, z up, NaN where nothing was measured.
+            cloud: (N, 3) or organized (H, W, 3) metres, x forward, y left, z up, NaN where nothing was measured.
 
         Raises:
-            CloudContentError: no cloud.
+            CloudContentError: not one cloud.
         """
         started = time.perf_counter()
-        points = check_one_cloud(points)
-        count = len(measured(points))
-        if count == 0:
-            return Prediction.abstain("nothing was measured: the cloud holds no points")
-        refused = None if self.gate is None else self.gate(points)
-        answer = self.rule(np.asarray(points)) if refused is None else RuleResult.abstain(refused)
+        cloud = check_one_cloud(cloud)
+        num_points = len(measured(cloud))
+        if num_points == 0:
+            error = TooFewPointsError("nothing was measured: the cloud holds no points")
+            return Prediction.abstain(Abstention.from_error(error))
+        abstention = None if self.gate is None else self.gate(cloud)
+        if abstention is not None:
+            return Prediction.abstain(abstention, num_points, _milliseconds_since(started))
+        result = self.rule(np.asarray(cloud))
         return Prediction(
-            answer.state,
-            {state: float(answer.state is not None and answer.state.label == state) for state in STATES},
-            count,
-            (time.perf_counter() - started) * 1000,
-            answer.reason,
-            answer.opening_angle_deg,
-            opening_width_m=answer.opening_width_m,
-            detections=answer.detections,
+            state=result.state,
+            probabilities={
+                state: float(result.state is not None and result.state.label == state) for state in STATES
+            },
+            num_points=num_points,
+            milliseconds=_milliseconds_since(started),
+            abstention=Abstention("no_rule_result", message=result.reason) if result.state is None else None,
+            opening_angle_deg=result.opening_angle_deg,
+            opening_width_m=result.opening_width_m,
+            detections=result.detections,
         )
+
+
+def _milliseconds_since(started_s: float) -> float:
+    return (time.perf_counter() - started_s) * 1000

@@ -6,23 +6,31 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from doorstate.errors import TooFewPointsError
+from doorstate.errors import TooFewPointsError, WriteParameter, python_parameter
 
 if TYPE_CHECKING:
-    from doorstate.inference.predictor import Prediction
+    from doorstate.inference.prediction import Prediction
 
 
-def prediction_to_dict(prediction: Prediction) -> dict[str, Any]:
-    """Return a prediction as a JSON object: `reason` only without a state, optional fields only where predicted."""
-    optional = {name: get(prediction) for name, get in OPTIONAL_FIELDS.items()}
-    return {
+def prediction_to_dict(
+    prediction: Prediction, parameter: WriteParameter = python_parameter
+) -> dict[str, Any]:
+    """Return a prediction as JSON values; fields without a value are left out.
+
+    Args:
+        prediction: of any method.
+        parameter: writes a parameter that a reason suggests as the surface spells it.
+    """
+    record: dict[str, Any] = {
         "state": None if prediction.state is None else prediction.state.label,
         "probabilities": {state: round(p, 6) for state, p in prediction.probabilities.items()},
-        "points": prediction.points,
+        "points": prediction.num_points,
         "milliseconds": round(prediction.milliseconds, 3),
-        **({"reason": prediction.reason} if prediction.state is None else {}),
-        **{name: value for name, value in optional.items() if value is not None},
     }
+    if prediction.abstention is not None:
+        record["reason"] = prediction.abstention.describe(parameter)
+    values = {name: value(prediction) for name, value in OPTIONAL_FIELDS.items()}
+    return record | {name: value for name, value in values.items() if value is not None}
 
 
 def require_points(prediction: Prediction) -> Prediction:
@@ -31,8 +39,9 @@ def require_points(prediction: Prediction) -> Prediction:
     Raises:
         TooFewPointsError: the prediction is based on no points.
     """
-    if prediction.points == 0:
-        raise TooFewPointsError(prediction.reason)
+    if prediction.num_points == 0:
+        error = None if prediction.abstention is None else prediction.abstention.error
+        raise error or TooFewPointsError(prediction.reason)
     return prediction
 
 

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from doorstate.errors import ConfigError
-from doorstate.inference.predictor import Prediction, Predictor
+from doorstate.inference.prediction import Prediction
+from doorstate.inference.predictor import Predictor
 from doorstate.types import STATES, DoorState, Points
 
 

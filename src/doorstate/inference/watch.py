@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from doorstate.clouds.preparation import is_measured
 from doorstate.errors import CameraError, DoorstateError, summarize_exception
-from doorstate.inference.predictor import Prediction, Predictor
-from doorstate.inference.rule_predictor import RulePredictor
+from doorstate.inference.abstention import Abstention
+from doorstate.inference.prediction import Prediction
+from doorstate.inference.predictor import Predictor
 from doorstate.inference.serialization import prediction_to_dict
 from doorstate.inference.stream import FilteredState, Holding, StateFilter
 from doorstate.inference.watch_settings import MESSAGE_TYPES, WatchSettings
@@ -83,7 +84,7 @@ class DoorWatch:
         DoorstateError: as of `WatchSettings.load_predictor`.
     """
 
-    def __init__(self, settings: WatchSettings, predictor: Predictor | RulePredictor | None = None) -> None:
+    def __init__(self, settings: WatchSettings, predictor: Predictor | None = None) -> None:
         self._settings = settings
         self._type = MESSAGE_TYPES[settings.input]
         self._predictor = predictor or settings.load_predictor()
@@ -128,9 +129,11 @@ class DoorWatch:
             middle = _middle_m(points)
             prediction = self._predictor(points)
         except DoorstateError as error:
-            prediction = Prediction.abstain(str(error))
+            prediction = Prediction.abstain(Abstention.from_error(error))
         except Exception as error:  # what libraries make of foreign bytes must not end a robot's node
-            prediction = Prediction.abstain(f"damaged message ({summarize_exception(error)})")
+            prediction = Prediction.abstain(
+                Abstention("damaged_message", message=f"damaged message ({summarize_exception(error)})")
+            )
         stamp_s = stamp_ns / 1e9
         if prediction.state is not None:
             self._seen_s = stamp_s
@@ -156,7 +159,7 @@ class DoorWatch:
     def silence(self, now_ns: int) -> DoorReport:
         """What is said when no message has come for `silence_s`: nothing is known any more."""
         self._start_anew()
-        prediction = Prediction.abstain(f"no message for {self._settings.silence_s:g} s")
+        prediction = Prediction.abstain(Abstention("no_message", {"silence_s": self._settings.silence_s}))
         filtered = StateFilter().update(prediction, now_ns / 1e9)
         return DoorReport(now_ns, self._frame_id, prediction, filtered, None, False, np.zeros(3))
 

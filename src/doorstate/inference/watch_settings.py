@@ -4,16 +4,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import ConfigDict, Field, ValidationError
 
 from doorstate._models import FrozenModel
 from doorstate.errors import ConfigError
-from doorstate.inference.loading import load_predictor
-from doorstate.inference.predictor import DEFAULT_GATE, DEFAULT_NETWORK, Predictor
-from doorstate.inference.rule_predictor import RulePredictor
+from doorstate.inference.gate import DEFAULT_GATE
+from doorstate.inference.predictor import DEFAULT_NETWORK, Predictor
 from doorstate.io.messages import CLOUD, COMPRESSED_IMAGE, IMAGE
 from doorstate.io.readers import UNITS_M, ReadOptions
 
@@ -61,16 +59,21 @@ class WatchSettings(FrozenModel):
         frame = named if self.frame == "auto" else self.frame
         return ReadOptions(frame, self.roll, None, self.depth_scale, UNITS_M[self.units])
 
-    def load_predictor(self) -> Predictor | RulePredictor:
-        """Who answers; errors as of `doorstate.inference.loading.load_predictor`."""
-        return load_predictor(
-            None if self.weights or self.rule else self.network,
-            Path(self.weights) if self.weights else None,
-            self.rule or None,
-            self.points or None,
+    def load_predictor(self) -> Predictor:
+        """Load and warm up the network or rule that is named.
+
+        Raises:
+            DoorstateError: as of `Predictor.load`.
+        """
+        predictor = Predictor.load(
+            None if self.rule and not self.weights else self.weights or self.network,
+            rule=self.rule or None,
+            num_points=self.points or None,
             budget_ms=self.budget_ms or None,
             gate=DEFAULT_GATE if self.gate else None,
         )
+        predictor.warm_up()
+        return predictor
 
 
 def parse_settings(given: Mapping[str, Any]) -> WatchSettings:

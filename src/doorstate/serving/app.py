@@ -11,14 +11,14 @@ from fastapi import FastAPI, Query, Request
 from fastapi.responses import PlainTextResponse
 
 from doorstate import __version__
+from doorstate.inference.network_predictor import NetworkPredictor
 from doorstate.inference.predictor import Predictor
-from doorstate.inference.rule_predictor import RulePredictor
 from doorstate.inference.serialization import prediction_to_dict, require_points
 from doorstate.io.readers import parse_cloud
 from doorstate.serving.errors import STATUS_DESCRIPTIONS, add_error_handlers
 from doorstate.serving.lingering_close import LingeringClose
 from doorstate.serving.models import ErrorResponse, HealthResponse, PredictionResponse
-from doorstate.serving.request import PredictQuery
+from doorstate.serving.request import PredictQuery, format_parameter
 from doorstate.serving.work_queue import Limits, WorkQueue
 
 _FILE = {"schema": {"type": "string", "format": "binary"}}
@@ -36,7 +36,7 @@ GET  /docs                the same as a page, which loads scripts from a public 
 """
 
 
-def create_app(predictor: Predictor | RulePredictor, limits: Limits | None = None) -> FastAPI:
+def create_app(predictor: Predictor, limits: Limits | None = None) -> FastAPI:
     """Return the service as an ASGI application.
 
     Args:
@@ -67,11 +67,11 @@ def create_app(predictor: Predictor | RulePredictor, limits: Limits | None = Non
 
     @app.get("/health", summary="State of the service", response_model_exclude_none=True)
     async def health() -> HealthResponse:
-        if isinstance(predictor, RulePredictor):
-            return HealthResponse(ready=True, version=__version__, rule=predictor.rule.name)
-        return HealthResponse(
-            ready=True, version=__version__, network=predictor.card.network, points=predictor.points
-        )
+        if isinstance(predictor, NetworkPredictor):
+            return HealthResponse(
+                ready=True, version=__version__, network=predictor.name, points=predictor.num_points
+            )
+        return HealthResponse(ready=True, version=__version__, rule=predictor.name)
 
     @app.post(
         "/predict",
@@ -88,7 +88,8 @@ def create_app(predictor: Predictor | RulePredictor, limits: Limits | None = Non
         options, suffix = query.read_options(), query.suffix(request.headers.get("content-type", ""))
 
         def predict_file(content: bytes) -> dict[str, Any]:
-            return prediction_to_dict(require_points(predictor(parse_cloud(content, suffix, options))))
+            prediction = require_points(predictor(parse_cloud(content, suffix, options)))
+            return prediction_to_dict(prediction, format_parameter)
 
         return await queue.run(request, predict_file)
 

@@ -9,14 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from doorstate.clouds.preparation import NUM_POINTS, CloudSpec, prepare_cloud
+from doorstate.clouds.preparation import NUM_POINTS
 from doorstate.errors import DoorstateError, WriteParameter, python_parameter
 from doorstate.evaluation.detections import encode_detections
 from doorstate.evaluation.pages import encode_bytes, encode_cloud, render_page
 from doorstate.evaluation.views import STATE_COLORS
-from doorstate.inference.onnx_backend import OnnxBackend
+from doorstate.inference.network_predictor import NetworkPredictor
 from doorstate.inference.predictor import Predictor
-from doorstate.inference.rule_predictor import RulePredictor
 from doorstate.inference.serialization import prediction_to_dict
 from doorstate.types import STATES, Points
 from doorstate.viewer.named_clouds import NamedCloud
@@ -28,7 +27,7 @@ CHANNEL_STEPS = 32  # a channel count is stored in steps of 1/32, so that two by
 
 
 def make_entry(
-    predictor: Predictor | RulePredictor,
+    predictor: Predictor,
     named: NamedCloud,
     parameter: WriteParameter = python_parameter,
 ) -> Entry:
@@ -44,10 +43,7 @@ def make_entry(
         if isinstance(named.cloud, DoorstateError):
             raise named.cloud
         prediction = predictor(named.cloud)
-        if isinstance(predictor, Predictor):
-            prepared = predictor.prepare(named.cloud)
-        else:
-            prepared = prepare_cloud(named.cloud, CloudSpec(thin=True))
+        prepared = predictor.prepare(named.cloud)
     except DoorstateError as error:
         return entry | {"error": error.describe(parameter, with_path=False)}
     counts = None if prediction.state is None else _channel_counts(predictor, prepared.points)
@@ -56,23 +52,24 @@ def make_entry(
         entry["channels"] = encode_bytes(steps.tobytes())
     parts = None if named.parts is None else named.parts[prepared.indices[:NUM_POINTS]]
     return entry | {
-        "prediction": prediction_to_dict(prediction),
+        "prediction": prediction_to_dict(prediction, parameter),
         "cloud": encode_cloud(prepared.points[:NUM_POINTS], parts),
         "shapes": encode_detections(prediction.detections),
     }
 
 
-def _channel_counts(predictor: Predictor | RulePredictor, points: Points) -> NDArray[np.float32] | None:
+def _channel_counts(predictor: Predictor, points: Points) -> NDArray[np.float32] | None:
     """Return (N,) channel counts of the points; None where these are not defined."""
-    if isinstance(predictor, RulePredictor) or isinstance(predictor.network, OnnxBackend):
+    network = predictor.backend.network if isinstance(predictor, NetworkPredictor) else None
+    if network is None:
         return None
     from doorstate.viewer.critical_points import critical_points  # needs torch, an exported network does not
 
-    return critical_points(predictor.network, points)
+    return critical_points(network, points)
 
 
 def render_cloud_page(
-    predictor: Predictor | RulePredictor, entries: Sequence[Entry], *, live: bool = False
+    predictor: Predictor, entries: Sequence[Entry], *, live: bool = False
 ) -> str:
     """Return the page.
 

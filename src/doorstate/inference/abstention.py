@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Reason for a prediction without a state, as data; its sentence is built here and nowhere else."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+from doorstate.errors import DoorstateError, TooFewPointsError, WriteParameter, python_parameter
+
+AbstentionCode = Literal[
+    "too_few_points",  # nothing or hardly anything was measured
+    "low_coverage",
+    "points_behind_camera",
+    "too_near",
+    "too_far",
+    "too_small",
+    "narrow_view",
+    "hole",  # glass or missing data: no free way is visible
+    "no_door",
+    "unsure",
+    "no_rule_result",
+    "unusable_cloud",
+    "damaged_message",
+    "no_message",
+]
+
+_SENTENCES: dict[AbstentionCode, str] = {
+    "too_few_points": "too few points were measured: at least {min_points} are needed",
+    "low_coverage": "only {share:.0%} of the cloud was measured: at least {min_share:.0%} are needed",
+    "points_behind_camera": "{share:.0%} of the points lie behind the camera: a scan, or a cloud in another frame",
+    "too_near": "half of the points are within {median_m:.2f} m: something is before the camera",
+    "too_far": "half of the points are beyond {median_m:.1f} m: too far away for a door",
+    "too_small": "the surfaces are only {width_m:.2f} m wide and {height_m:.2f} m high: too little for a door",
+    "narrow_view": "the view is only {view_deg:.0f} degrees wide: at least {min_view_deg:g} are needed",
+    "hole": "{share:.0%} of the view ahead is a hole without a floor {free_reach_m:g} m away: glass or missing data",
+    "no_door": "there seems to be no door: its probability is {probability:.2f}",
+    "unsure": "unsure: {state} has probability {probability:.2f}, these weights need {min_probability:.2f}",
+    "no_message": "no message for {silence_s:g} s",
+}
+
+
+@dataclass(frozen=True)
+class Abstention:
+    """Reason why a predictor gives no state.
+
+    Args:
+        code: kind of the reason, for programs.
+        values: measured values and their limits, by name.
+        message: sentence of a rule or of another library; empty where the code has its own sentence.
+        suggestions: parameters by name and values to try, such as `{"frame": "optical"}`.
+        error: error that made the cloud unusable, if one did.
+    """
+
+    code: AbstentionCode
+    values: Mapping[str, float | str] = field(default_factory=dict)
+    message: str = ""
+    suggestions: Mapping[str, object] = field(default_factory=dict)
+    error: DoorstateError | None = field(default=None, compare=False, repr=False)
+
+    @classmethod
+    def from_error(cls, error: DoorstateError) -> Abstention:
+        """Return the reason of a cloud or message that cannot be used."""
+        code: AbstentionCode = "too_few_points" if isinstance(error, TooFewPointsError) else "unusable_cloud"
+        return cls(code, message=str(error), error=error)
+
+    def __str__(self) -> str:
+        return self.describe()
+
+    def describe(self, parameter: WriteParameter = python_parameter) -> str:
+        """Return one sentence.
+
+        Args:
+            parameter: writes a suggested parameter as the surface spells it.
+        """
+        if self.error is not None:
+            return self.error.describe(parameter)
+        sentence = self.message or _SENTENCES[self.code].format(**self.values)
+        tries = " ".join(parameter(name, value) for name, value in self.suggestions.items())
+        return f"{sentence}; try {tries}" if tries else sentence

@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Exported network run by onnxruntime; torch is not needed."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pydantic import ValidationError
+
+from doorstate.clouds.preparation import centroids
+from doorstate.errors import WeightsError, missing_extra, summarize_exception
+from doorstate.inference.backends.base import Outputs
+from doorstate.networks.card import WeightsCard
+from doorstate.networks.heads import head_columns
+from doorstate.types import PARTS, STATES, Points
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+INPUT, OUTPUT = "points", "probabilities"
+CARD_KEY = "doorstate"  # in the metadata of the file
+_LOG_ERRORS_ONLY = 3
+
+
+class OnnxBackend:
+    """Network in an `.onnx` file; its graph includes normalisation and temperature.
+
+    Args:
+        path: file written by `export_onnx`.
+        threads: processor threads of one call; None takes OMP_NUM_THREADS from the environment, as torch does, and
+            all processors if it is not set.
+
+    Raises:
+        MissingExtraError: onnxruntime is not installed.
+        WeightsError: the file is missing, damaged, or not written by `export_onnx`.
+    """
+
+    network = None
+
+    def __init__(self, path: Path, threads: int | None = None) -> None:
+        self._session = _open_session(path, _default_threads() if threads is None else threads)
+        self.card = _read_card(path, self._session.get_modelmeta().custom_metadata_map)
+        self.num_points = self.card.num_points
+        self._heads = head_names(self.card)
+
+    def __call__(self, points: Points) -> Outputs:
+        """Run the network on (B, n, 3) metres in farthest-point order, n as in `num_points`."""
+        probabilities, *heads = self._session.run([OUTPUT, *self._heads], {INPUT: points})
+        named_heads = dict(zip(self._heads, heads, strict=True))
+        return Outputs(probabilities, head_columns(named_heads, centroids(points)))
+
+
+def head_names(card: WeightsCard) -> tuple[str, ...]:
+    """Return the outputs of a file besides the probabilities: the heads of whole clouds."""
+    return tuple(name for name in card.heads if name != PARTS)
+
+
+def _open_session(path: Path, threads: int) -> Any:
+    try:
+        import onnxruntime
+    except ImportError as error:
+        raise missing_extra(path.name, "onnxruntime") from error
+    if not path.is_file():
+        raise WeightsError("no such weights file", path=path)
+    options = onnxruntime.SessionOptions()
+    options.log_severity_level = _LOG_ERRORS_ONLY
+    options.intra_op_num_threads = threads
+    try:
+        return onnxruntime.InferenceSession(path, options, providers=["CPUExecutionProvider"])
+    except Exception as error:  # onnxruntime's errors have no common class of their own
+        raise WeightsError(f"cannot be read as ONNX ({summarize_exception(error)})", path=path) from error
+
+
+def _read_card(path: Path, metadata: Mapping[str, str]) -> WeightsCard:
+    try:
+        card = WeightsCard.model_validate_json(metadata[CARD_KEY])
+    except (KeyError, ValidationError) as error:
+        raise WeightsError(
+            "not exported by doorstate: its metadata hold no weights card", path=path, field=CARD_KEY
+        ) from error
+    if card.states != STATES:
+        raise WeightsError(f"made for states {card.states}", path=path)
+    return card
+
+
+def _default_threads() -> int:
+    value = os.environ.get("OMP_NUM_THREADS", "")
+    return int(value) if value.isdecimal() else 0

@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Network run by torch."""
+
+from __future__ import annotations
+
+import torch
+
+from doorstate.clouds.preparation import centroids, normalize
+from doorstate.inference.backends.base import Outputs
+from doorstate.networks.base import PointNetwork
+from doorstate.networks.card import WeightsCard
+from doorstate.networks.head_layers import head_outputs
+from doorstate.networks.heads import STATE, head_columns
+from doorstate.types import Points
+
+
+class TorchBackend:
+    """Network in evaluation mode, in the number type of its weights.
+
+    Args:
+        network: classifier; is changed to evaluation mode.
+        card: of its weights.
+    """
+
+    num_points = None
+
+    def __init__(self, network: PointNetwork, card: WeightsCard) -> None:
+        self.network = network.eval()
+        self.card = card
+
+    def __call__(self, points: Points) -> Outputs:
+        """Run the network on (B, n, 3) metres in farthest-point order."""
+        dtype = next(self.network.parameters()).dtype
+        with torch.inference_mode():
+            outputs = head_outputs(self.network, torch.from_numpy(normalize(points)).to(dtype), parts=False)
+            probabilities = (outputs.pop(STATE) / self.card.temperature).softmax(1).numpy()
+        heads = {name: values.numpy() for name, values in outputs.items()}
+        return Outputs(probabilities, head_columns(heads, centroids(points)))

@@ -1,0 +1,178 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Network with its weights, on the path that training took: clean, sample, gate, network, decode."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from doorstate.clouds.preparation import (
+    MIN_POINTS,
+    CloudSpec,
+    PreparedCloud,
+    check_one_cloud,
+    is_image,
+    prepare_cloud,
+)
+from doorstate.errors import CloudContentError, ConfigError, TooFewPointsError
+from doorstate.inference.abstention import Abstention
+from doorstate.inference.backends import Backend, load_backend, run_by_size
+from doorstate.inference.budget import largest_within_budget
+from doorstate.inference.decode import decode
+from doorstate.inference.gate import DEFAULT_GATE, Gate
+from doorstate.inference.prediction import Prediction
+from doorstate.inference.predictor import DEFAULT_NETWORK, Predictor
+from doorstate.types import Points
+
+_NO_POINTS = np.empty((0, 3), np.float32)
+
+
+class NetworkPredictor(Predictor):
+    """Network with its weights, and the preparation they were trained with.
+
+    Args:
+        backend: network with its weights.
+        num_points: points that the network evaluates; None takes the number recorded with the weights.
+        thin: sample from some rows and columns of an organized cloud, which is several times quicker, and not from
+            all as in training (clouds.preparation).
+        gate: rejects clouds in which too much is missing; None rejects nothing.
+        clock: seconds, for `milliseconds` and time budgets.
+
+    Raises:
+        ConfigError: fewer than 128 points, or another number than the backend takes.
+    """
+
+    def __init__(
+        self,
+        backend: Backend,
+        num_points: int | None = None,
+        *,
+        thin: bool = True,
+        gate: Gate | None = DEFAULT_GATE,
+        clock: Callable[[], float] = time.perf_counter,
+    ) -> None:
+        self.backend = backend
+        self.card = backend.card
+        self.num_points = self.card.points if num_points is None else num_points
+        self.gate = gate
+        self.clock = clock
+        if self.num_points < MIN_POINTS:
+            raise ConfigError(
+                f"{num_points} points are too few for a network", expected=f"{MIN_POINTS} or more"
+            )
+        if backend.num_points not in (None, self.num_points):
+            raise ConfigError(
+                f"the exported network takes {backend.num_points} points, not {num_points}: export it again"
+            )
+        self.spec = CloudSpec(num_points=self.num_points, thin=thin, max_depth_m=self.card.max_depth_m)
+
+    @classmethod
+    def from_weights(
+        cls,
+        name_or_path: str | Path = DEFAULT_NETWORK,
+        *,
+        num_points: int | None = None,
+        budget_ms: float | None = None,
+        thin: bool = True,
+        gate: Gate | None = DEFAULT_GATE,
+        threads: int | None = None,
+        clock: Callable[[], float] = time.perf_counter,
+    ) -> NetworkPredictor:
+        """Load packaged weights by name or a weights file by path; arguments as of `Predictor.load` and the class.
+
+        Raises:
+            ConfigError: both points and a budget, or a budget that is not above zero.
+            WeightsError: no such weights, or they cannot be used.
+            MissingExtraError: torch or onnxruntime is needed and not installed.
+        """
+        if budget_ms is not None and (num_points is not None or not budget_ms > 0):
+            raise ConfigError(
+                f"a budget of {budget_ms} ms with {num_points} points: give one of them, above zero"
+            )
+        backend = load_backend(name_or_path, threads)
+
+        def with_points(count: int | None) -> NetworkPredictor:
+            return cls(backend, count, thin=thin, gate=gate, clock=clock)
+
+        if budget_ms is None:
+            return with_points(num_points)
+        if backend.num_points is not None:
+            return with_points(backend.num_points)
+        return largest_within_budget(with_points, backend.card.num_points, budget_ms)
+
+    @property
+    def name(self) -> str:
+        return self.card.network
+
+    def __str__(self) -> str:
+        return f"{self.name}, {self.num_points} points"
+
+    def __call__(self, cloud: Points) -> Prediction:
+        return self.batch([cloud])[0]
+
+    def batch(self, clouds: Sequence[Points]) -> list[Prediction]:
+        """Predict the states of the doors in several clouds; equally large ones pass the network together.
+
+        Returns:
+            One prediction a cloud, in their order; `milliseconds` is an equal share of the time of all.
+
+        Raises:
+            CloudContentError: a cloud that is none or not in metres, or one cloud in place of several.
+        """
+        started = self.clock()
+        samples = [self._sample(check_one_cloud(cloud)) for cloud in _several(clouds)]
+        accepted = [sample.points for sample in samples if sample.abstention is None]
+        outputs = iter(run_by_size(self.backend, accepted))
+        milliseconds = (self.clock() - started) * 1000 / max(1, len(samples))
+        return [
+            decode(next(outputs), self.card.abstain_below, len(points), milliseconds)
+            if abstention is None
+            else Prediction.abstain(abstention, len(points), milliseconds)
+            for points, abstention in samples
+        ]
+
+    def prepare(self, cloud: Points) -> PreparedCloud:
+        """Return the points that the network evaluates.
+
+        Raises:
+            CloudContentError: as for a call.
+            TooFewPointsError: there are not enough.
+        """
+        prepared = prepare_cloud(cloud, self.spec)
+        if self.backend.num_points is not None and len(prepared.points) < self.backend.num_points:
+            raise TooFewPointsError(
+                f"too few points: {len(prepared.points)} distinct, but the exported network takes "
+                f"{self.backend.num_points}",
+                hint="export it again with fewer points",
+            )
+        return prepared
+
+    def warm_up(self) -> None:
+        """Run once on noise, so that the first cloud is as quick as later ones; the process keeps freed memory."""
+        super().warm_up()
+        cloud = np.random.default_rng(0).normal(2.0, 1.0, (self.num_points, 3)).astype(np.float32)
+        self.backend(prepare_cloud(cloud, CloudSpec(num_points=self.num_points)).points[None])
+
+    def _sample(self, cloud: Points) -> _Sample:
+        """Return the points for the network, and the reason why it must not be run."""
+        try:
+            points = self.prepare(cloud).points
+        except TooFewPointsError as error:
+            return _Sample(_NO_POINTS, Abstention.from_error(error))
+        return _Sample(points, None if self.gate is None else self.gate(cloud))
+
+
+class _Sample(NamedTuple):
+    points: Points  # (n, 3) in farthest-point order
+    abstention: Abstention | None
+
+
+def _several(clouds: Sequence[Points]) -> Sequence[Points]:
+    whole = np.asarray(clouds) if hasattr(clouds, "ndim") else None
+    if whole is not None and (whole.ndim == 2 or (whole.ndim == 3 and is_image(whole))):
+        raise CloudContentError(f"this is one cloud, {whole.shape}: give several, or call the predictor")
+    return clouds
