@@ -75,7 +75,9 @@ class Stopped:
 @contextmanager
 def serving(gate: Any = None, rule: str = "", **limits: Any) -> Iterator[httpx.Client]:
     """A client of the service, run by Uvicorn in a thread of this process."""
-    answering = RulePredictor.from_name(rule) if rule else NetworkPredictor(TorchBackend(NETWORK, CARD), gate=gate)
+    answering = (
+        RulePredictor.from_name(rule) if rule else NetworkPredictor(TorchBackend(NETWORK, CARD), gate=gate)
+    )
     app = create_app(answering, Limits(**{"workers": 1} | limits))
     listening = socket.create_server(("127.0.0.1", 0))
     config = uvicorn.Config(

@@ -99,8 +99,8 @@ def view(
       doorstate view --live incoming/ --port 8080 --no-open
     """
     from doorstate._files import check_writable
-    from doorstate.cli.view_output import show_live, show_page
     from doorstate.cli.predictors import load_predictor
+    from doorstate.cli.view_output import show_live, show_page
 
     check_source(files, bag)
     if bag is None and (topic, camera_info_topic) != (None, None):

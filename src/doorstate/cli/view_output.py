@@ -68,9 +68,7 @@ def show_page(
         raise typer.Exit(1)
 
 
-def show_live(
-    predictor: Predictor, clouds: Iterable[NamedCloud], port: int, open_browser: bool
-) -> None:
+def show_live(predictor: Predictor, clouds: Iterable[NamedCloud], port: int, open_browser: bool) -> None:
     """Serve a page that shows clouds as they arrive, until Ctrl-C.
 
     Args:

@@ -68,9 +68,7 @@ def _channel_counts(predictor: Predictor, points: Points) -> NDArray[np.float32]
     return critical_points(network, points)
 
 
-def render_cloud_page(
-    predictor: Predictor, entries: Sequence[Entry], *, live: bool = False
-) -> str:
+def render_cloud_page(predictor: Predictor, entries: Sequence[Entry], *, live: bool = False) -> str:
     """Return the page.
 
     Args:
