@@ -32,7 +32,9 @@ class TorchBackend:
         """Run the network on (B, n, 3) metres in farthest-point order."""
         dtype = next(self.network.parameters()).dtype
         with torch.inference_mode():
-            outputs = head_outputs(self.network, torch.from_numpy(normalize(points)).to(dtype), parts=False)
+            outputs = head_outputs(
+                self.network, torch.from_numpy(normalize(points)).to(dtype), with_points=False
+            )
             probabilities = (outputs.pop(STATE) / self.card.temperature).softmax(1).numpy()
         heads = {name: values.numpy() for name, values in outputs.items()}
         return Outputs(probabilities, head_columns(heads, centroids(points)))
