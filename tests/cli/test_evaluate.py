@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`doorstate evaluate` as typed at a prompt, and its page in a browser."""
+"""`doorstate evaluate`, and its page in the browser."""
 
 from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -16,14 +15,13 @@ from doorstate._files import write_csv
 from doorstate.simulation.frames import replay
 from doorstate.simulation.generate import PRESETS, draw_pose
 from doorstate.types import ABSTAINED
+from tests.cli.helpers import Run, check_error
 from tests.headless_chromium import open_browser_page
-
-Run = Callable[..., tuple[int, str, str]]
 
 
 @pytest.fixture(scope="module")
 def recordings(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Depth images of a simulated camera with their index: two doors, one frame without, one that is no depth image."""
+    """Index of simulated depth images: two doors in three states, one frame without a door, one 8-bit image."""
     folder = tmp_path_factory.mktemp("recordings") / "lab"
     folder.mkdir()
     camera = {"fx": "554.3", "fy": "554.3", "cx": "319.5", "cy": "239.5", "depth_unit_m": "0.001"}
@@ -50,21 +48,20 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("report")
 
 
-def test_answers_are_counted_and_written(recordings: Path, report: Path, weights: Path, run: Run) -> None:
+def test_predictions_are_scored_and_written(recordings: Path, report: Path, weights: Path, run: Run) -> None:
     code, out, err = run(
         "evaluate",
         recordings,
         *("--weights", weights, "--rule", "plane_state", "--by", "door:glass", "--all", "--out", report),
     )
     assert code == 1  # one file could not be read
-    assert err.startswith("coarse.png: 8-bit image")
-    assert "1 of 8 files could not be read and are not counted" in err
-    assert "6 frames with a door of 2 doors, as column door names them: 2 closed, 2 semi-open, 2 open." in out
-    assert "Frames without a clear door" in out
+    assert err.startswith("coarse.png: ")
+    assert err.count("coarse.png") == 1
+    assert "plane_state" in out
     metrics = json.loads((report / "metrics.json").read_text(encoding="utf-8"))
     assert list(metrics["methods"]) == ["pointnet", "plane_state"]
     assert list(metrics["not_read"]) == ["coarse.png"]
-    # A door without noise, 2 to 3 m away, is what the rule is for.
+    # Doors without noise at 2 to 3 m are easy for the rule.
     assert metrics["methods"]["plane_state"]["all"]["right"] >= 5
     with (report / "predictions.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
@@ -73,9 +70,7 @@ def test_answers_are_counted_and_written(recordings: Path, report: Path, weights
         sum(row["predicted"] == row["state"] for row in rows if row["method"] == "plane_state")
         == (metrics["methods"]["plane_state"]["all"]["right"])
     )
-    assert (
-        (report / "tables" / "recall.md").read_text(encoding="utf-8").startswith("**Recall of each state**")
-    )
+    assert (report / "tables" / "recall.md").is_file()
 
 
 def test_page_draws_clouds_and_filters_frames(report: Path) -> None:
@@ -110,21 +105,17 @@ def test_page_draws_clouds_and_filters_frames(report: Path) -> None:
         assert errors == []
 
 
-def test_folders_of_states_are_enough_and_the_same_files_come_out_twice(
-    recordings: Path, run: Run, tmp_path: Path
-) -> None:
+def test_state_folders_give_the_same_files_twice(recordings: Path, run: Run, tmp_path: Path) -> None:
     for state in ("closed", "semi_open", "open"):
         (tmp_path / state).mkdir()
         (tmp_path / state / "a.png").write_bytes((recordings / f"700_{state}.png").read_bytes())
-    asked = ("evaluate", tmp_path, "--rule", "plane_state", "--all")
+    command = ("evaluate", tmp_path, "--rule", "plane_state", "--all")
     camera = ("--fx", 554.3, "--fy", 554.3, "--cx", 319.5, "--cy", 239.5)
     first, second = tmp_path.with_name("first"), tmp_path.with_name("second")
-    code, out, err = run(*asked, *camera, "--out", first)
+    code, out, err = run(*command, *camera, "--out", first)
     assert code == 0
-    assert "3 frames with a door: 1 closed, 1 semi-open, 1 open." in out
-    assert "doors" not in out
-    assert err.endswith("frames.html shows the frames\n")
-    code, out, _ = run(*asked, *camera, "--json", "--out", second)
+    assert "frames.html" in err
+    code, out, _ = run(*command, *camera, "--json", "--out", second)
     assert code == 0
     written = json.loads((first / "metrics.json").read_text(encoding="utf-8"))
     assert json.loads(out).items() <= written.items()
@@ -133,33 +124,31 @@ def test_folders_of_states_are_enough_and_the_same_files_come_out_twice(
 
 
 @pytest.mark.parametrize(
-    ("arguments", "message"),
+    ("arguments", "expected_code", "name"),
     [
-        (("--by", "colour"), "no column 'colour'; there are: door, fx, fy, cx, cy, depth_unit_m, rgb"),
-        (("--group", "building"), "no column 'building'"),
-        (("--rule", "plane_state", "--rule", "plane_state"), "plane_state is asked for twice"),
-        (("--rule", "guess"), "guess"),
-        (("--network", "nobody"), "unknown packaged weights 'nobody'"),
-        (("--layout", "kitti"), "no layout 'kitti'"),
-        (("--layout", "deepdoors2", "--roll", "90"), "--layout says how its files are read"),
-        (("--all",), "--all is for the page of --out"),
-        (("--rule", "plane_state", "--points", "512"), "a rule evaluates all points"),
-        (("--out", "index.csv/report"), "index.csv/report/frames.html: cannot be written"),
+        (("--by", "colour"), 2, "colour"),
+        (("--group", "building"), 2, "building"),
+        (("--rule", "plane_state", "--rule", "plane_state"), 2, "plane_state"),
+        (("--rule", "guess"), 2, "guess"),
+        (("--network", "nobody"), 1, "nobody"),
+        (("--layout", "kitti"), 2, "kitti"),
+        (("--layout", "deepdoors2", "--roll", "90"), 2, "--layout"),
+        (("--all",), 2, "--all"),
+        (("--rule", "plane_state", "--points", "512"), 2, "points"),
+        (("--out", "index.csv/report"), 1, "index.csv/report/frames.html"),
     ],
 )
-def test_what_cannot_be_done_is_said_in_one_line(
-    arguments: tuple[str, ...], message: str, recordings: Path, run: Run
+def test_errors_are_one_line(
+    arguments: tuple[str, ...], expected_code: int, name: str, recordings: Path, run: Run
 ) -> None:
     arguments = tuple(str(recordings / word) if word.startswith("index.csv") else word for word in arguments)
-    code, out, err = run("evaluate", recordings, *arguments)
-    assert (code, out) == (1 if "nobody" in arguments or "--out" in arguments else 2, "")
-    assert message in err
-    assert err.count("\n") == 1
+    check_error(run("evaluate", recordings, *arguments), expected_code, name)
 
 
-def test_nothing_readable_is_an_error(run: Run, tmp_path: Path) -> None:
+def test_folder_without_readable_files_is_an_error(run: Run, tmp_path: Path) -> None:
     (tmp_path / "open").mkdir()
     (tmp_path / "open" / "a.pcd").write_bytes(b"no cloud")
-    code, _, err = run("evaluate", tmp_path, "--rule", "plane_state")
-    assert code == 1
-    assert "none of 1 files could be read" in err
+    code, out, err = run("evaluate", tmp_path, "--rule", "plane_state")
+    assert (code, out) == (1, "")
+    assert err.splitlines()[-1].startswith("doorstate: ")
+    assert str(tmp_path) in err
