@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The site (`make docs`): the Markdown of this folder as GitHub shows it, and the API from the docstrings."""
+"""Sphinx configuration of the site (`make docs`): the Markdown of this folder, and the API from the docstrings."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ html_theme = "furo"
 html_title = f"doorstate {__version__}"
 html_copy_source = False
 
-myst_heading_anchors = 3  # links such as deployment.md#the-gate, by GitHub's rules
+myst_heading_anchors = 3  # links to headings by GitHub's rules
 myst_links_external_new_tab = False
 
 autodoc_default_options = {
@@ -40,8 +40,8 @@ autodoc_type_aliases = {name: f"doorstate.types.{name}" for name in ("Points", "
 napoleon_numpy_docstring = False
 python_maximum_signature_line_length = 100
 python_use_unqualified_type_names = True
-# Types in signatures that lead nowhere: those of other projects, as asking their sites for addresses would need the
-# network, and those behind the commands. What clouds, rules, networks and deployment take and give has its place here.
+# Types in signatures without a target: those of other projects, which would need their sites, and those of packages
+# that have no reference page.
 nitpick_ignore_regex = [
     (
         "py:.*",
@@ -51,34 +51,34 @@ nitpick_ignore_regex = [
     (
         "py:.*",
         r"(doorstate\.rules\.base\.)?P|Points|Indices|Floats|Tensor|NDArray",
-    ),  # variables, and bare names of NamedTuples
+    ),  # type variables, and bare names in NamedTuples
 ]
 
 REPOSITORY = Path(__file__).resolve().parents[1]
-# Pages that live where people look for them on GitHub; in here a page of the name in front shows them.
-_ELSEWHERE = {"changelog": "CHANGELOG.md", "contributing": "CONTRIBUTING.md", "ros2": "ros2/README.md"}
+# Pages that live outside this folder, where GitHub looks for them, by their name in the site.
+_OUTSIDE_PAGES = {"changelog": "CHANGELOG.md", "contributing": "CONTRIBUTING.md", "ros2": "ros2/README.md"}
 
 
-def _read(app: Sphinx, page: str, source: list[str]) -> None:
+def _complete_page(app: Sphinx, page: str, source: list[str]) -> None:
     text = source[0]
-    if page in _ELSEWHERE:
-        text = _seen_from_here(_ELSEWHERE[page])
-    for inside, outside in _ELSEWHERE.items():
+    if page in _OUTSIDE_PAGES:
+        text = _with_moved_links(_OUTSIDE_PAGES[page])
+    for inside, outside in _OUTSIDE_PAGES.items():
         text = text.replace(f"](../{outside})", f"]({inside}.md)")
     if page == root_doc:
-        text += _contents(text)
+        text += _sidebar(text)
     elif page == "commands":
-        text += "\n".join(_help_of_commands())
+        text += "\n".join(_command_help())
     elif page == "zoo":
         text = re.sub(r"\]\(\.\./src/[\w/]+/([\w-]+)\.md\)", r"](#card-\1)", text) + _model_cards()
     elif page.startswith("benchmarks/"):
-        # Tables as `python -m benchmarks` writes them: without headings, reached from the text about them.
+        # Tables as `python -m benchmarks` writes them have no headings and no entry in the sidebar.
         text = "---\norphan: true\n---\n" + re.sub(r"^\*\*(.+)\*\*$", r"# \1", text, flags=re.MULTILINE)
     source[0] = text
 
 
-def _seen_from_here(file: str) -> str:
-    """A page of the repository, its relative links as seen from this folder."""
+def _with_moved_links(file: str) -> str:
+    """Return a page of the repository with its relative links rewritten for this folder."""
     path = REPOSITORY / file
 
     def moved(link: re.Match[str]) -> str:
@@ -90,8 +90,8 @@ def _seen_from_here(file: str) -> str:
     return re.sub(r"\]\(([^)\s]+)\)", moved, path.read_text(encoding="utf-8"))
 
 
-def _contents(index: str) -> str:
-    """The side bar: a section of the index is a group, a list item that begins with a link is a page."""
+def _sidebar(index: str) -> str:
+    """Return the sidebar: sections of the index are groups, list items that begin with a link are pages."""
     groups = re.split(r"^## (.+)\n", index, flags=re.MULTILINE)[1:]
     trees = []
     for title, body in zip(groups[::2], groups[1::2], strict=True):
@@ -101,7 +101,7 @@ def _contents(index: str) -> str:
     return "\n".join([*trees, ""])
 
 
-def _help_of_commands() -> list[str]:
+def _command_help() -> list[str]:
     names = [command.callback.__name__ for command in command_line.registered_commands if command.callback]
     texts = [
         CliRunner()
@@ -113,7 +113,7 @@ def _help_of_commands() -> list[str]:
 
 
 def _model_cards() -> str:
-    """The cards that lie beside the weights in the package, a level deeper."""
+    """Return the model cards of the packaged weights, one heading level deeper."""
     cards = sorted((REPOSITORY / "src/doorstate/networks/pretrained").glob("*.md"))
     return "".join(
         f"\n(card-{card.stem})=\n" + re.sub("^#", "##", card.read_text(encoding="utf-8"), flags=re.MULTILINE)
@@ -121,19 +121,19 @@ def _model_cards() -> str:
     )
 
 
-def _folders_as_text(app: Sphinx, document: nodes.document) -> None:
-    """Links to folders of the repository, which GitHub can show and a site cannot, stay as their text."""
+def _unlink_folders(app: Sphinx, document: nodes.document) -> None:
+    """Turn links to folders, which GitHub shows and a site does not, into plain text."""
     here = Path(app.env.doc2path(app.env.docname)).parent
     for link in list(document.findall(addnodes.pending_xref)):
         if link["reftype"] == "myst" and (here / link["reftarget"]).is_dir():
             link.replace_self(link.children)
 
 
-_COLON = "\N{INFORMATION SEPARATOR ONE}"
+_COLON_PLACEHOLDER = "\N{INFORMATION SEPARATOR ONE}"
 
 
-def _docstring(app: Sphinx, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:
-    """Before napoleon: Markdown's code and bars as reStructuredText has them, and prose that is no type."""
+def _convert_markdown(app: Sphinx, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:
+    """Convert code spans and bars from Markdown to reStructuredText, and hide colons that napoleon takes for types."""
     if any("├──" in line for line in lines):  # a tree is drawn below the first sentence
         lines[2:] = ["::", "", *(f"   {line}" for line in lines[2:])]
         return
@@ -141,19 +141,21 @@ def _docstring(app: Sphinx, what: str, name: str, thing: Any, options: Any, line
     for number, line in enumerate(lines):
         returns = line.strip() == "Returns:" or (returns and line[:1] in ("", " "))
         if returns or (what == "property" and number == 0):
-            line = line.replace(": ", f"{_COLON} ")  # napoleon takes what is before a colon for a type
+            line = line.replace(
+                ": ", f"{_COLON_PLACEHOLDER} "
+            )  # napoleon takes what is before a colon for a type
         code = re.sub(r"(?<!`)`([^`]+)`(?!`)", r"``\1``", line)
-        lines[number] = re.sub(r"(``.+?``)|\|", lambda found: found[1] or r"\|", code)
+        lines[number] = re.sub(r"(``.+?``)|\|", lambda match: match[1] or r"\|", code)
 
 
-def _colons(app: Sphinx, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:
-    lines[:] = [line.replace(_COLON, ":") for line in lines]
+def _restore_colons(app: Sphinx, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:
+    lines[:] = [line.replace(_COLON_PLACEHOLDER, ":") for line in lines]
 
 
-def _signature(
+def _simplify_signature(
     app: Sphinx, what: str, name: str, thing: Any, options: Any, signature: str | None, returns: str | None
 ) -> tuple[str | None, str | None]:
-    """Array types as people write them."""
+    """Return signature and result with readable array types."""
 
     def readable(text: str | None) -> str | None:
         text = text and re.sub(r"TypeAliasForwardRef\('([\w.]+)'\)", r"\1", text)
@@ -164,16 +166,18 @@ def _signature(
     return readable(signature), readable(returns)
 
 
-def _is_left_out(app: Sphinx, what: str, name: str, thing: Any, skip: bool, options: Any) -> bool | None:
-    """Fields of named tuples, which their signature has already."""
+def _skip_tuple_fields(
+    app: Sphinx, what: str, name: str, thing: Any, skip: bool, options: Any
+) -> bool | None:
+    """Skip fields of named tuples: the signature lists them already."""
     return True if str(getattr(thing, "__doc__", "")).startswith("Alias for field number") else None
 
 
 def setup(app: Sphinx) -> None:
-    """Called by Sphinx."""
-    app.connect("source-read", _read)
-    app.connect("doctree-read", _folders_as_text)
-    app.connect("autodoc-process-docstring", _docstring, priority=400)  # napoleon comes at 500
-    app.connect("autodoc-process-docstring", _colons, priority=600)
-    app.connect("autodoc-process-signature", _signature)
-    app.connect("autodoc-skip-member", _is_left_out)
+    """Register the hooks."""
+    app.connect("source-read", _complete_page)
+    app.connect("doctree-read", _unlink_folders)
+    app.connect("autodoc-process-docstring", _convert_markdown, priority=400)  # napoleon comes at 500
+    app.connect("autodoc-process-docstring", _restore_colons, priority=600)
+    app.connect("autodoc-process-signature", _simplify_signature)
+    app.connect("autodoc-skip-member", _skip_tuple_fields)

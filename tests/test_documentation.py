@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """End-to-end test of the documentation: every bash and python block of the pages runs, in order, page by page.
 
-What cannot run here (servers, live topics, long trainings) stands in `console` or `text` blocks. Simulations and trainings get extra options
-that make them small.
+What cannot run here (servers, live topics, long trainings) stands in `console` or `text` blocks. Simulations and
+trainings get extra options that make them small.
 """
 
 from __future__ import annotations
