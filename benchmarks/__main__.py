@@ -284,35 +284,6 @@ def service(
 
 
 @app.command()
-def fuzz(
-    out: Out,
-    inputs: Annotated[int, typer.Option(help="How many.", min=1)] = 100_000,
-    seconds: Annotated[float | None, typer.Option(help="Stop then, if not done before.", min=1)] = None,
-    first: Annotated[int, typer.Option(help="Number of the first input.", min=0)] = 0,
-    workers: Annotated[int, typer.Option(help="Processes.", min=1)] = 1,
-) -> None:
-    """Broken files, bags, messages and requests through every reader and the service: which are not refused cleanly.
-
-    An input is made from its number alone; those that make something fail are kept in a folder beside the table,
-    and the exit code is 1.
-
-    \b
-    Examples:
-      python -m benchmarks fuzz --out reports/fuzz
-      python -m benchmarks fuzz --seconds 600 --first 1000000 --workers 2 --out reports/fuzz
-    """
-    from benchmarks.fuzz import fuzz_table, measure
-    from benchmarks.fuzzer import FAILURES
-    from doorstate.cli.console import progress_bar
-
-    with progress_bar("fuzz") as progress:
-        rows = measure(first, inputs, seconds, workers, out / "fuzz-failures", progress)
-    _finish(out, "fuzz", rows, fuzz_table(rows, first), first=first)
-    if any(row[outcome] for row in rows for outcome in FAILURES):
-        raise typer.Exit(1)
-
-
-@app.command()
 def curves(
     out: Out,
     data: Annotated[Path, typer.Option(help="A prepared data set.")],

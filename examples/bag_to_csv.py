@@ -15,7 +15,7 @@ from pathlib import Path
 from doorstate import Predictor
 from doorstate.errors import DoorstateError
 from doorstate.io.bags import open_bag
-from doorstate.io.readers import ReadOptions
+from doorstate.io.options import ReadOptions
 
 
 def main(recording: Path, table: Path) -> None:

@@ -14,7 +14,7 @@ from pathlib import Path
 from statistics import median
 
 from doorstate import Predictor, read_cloud
-from doorstate.io.readers import find_clouds
+from doorstate.io.find import find_clouds
 
 BUDGET_MS = 100  # until the next cloud comes
 

@@ -9,29 +9,20 @@ import os
 import shutil
 import subprocess
 import sys
-import time
-import warnings
 from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 import torch
-from benchmarks import fuzz
-from benchmarks.broken_bags import BAG_SUFFIXES
-from benchmarks.fuzzer import BAG_FOLDER, CAMERA, OUTCOMES, TARGETS, Fuzzer
 from benchmarks.gate import FAULTS
-from benchmarks.mutations import MESSAGES
 from benchmarks.onnx import onnx_table
 
 from doorstate._jobs import no_progress
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import ConfigError, RunError
-from doorstate.inference.prediction import Prediction
 from doorstate.networks.packaged import packaged_weights
 from doorstate.rules import list_rules
-from doorstate.types import DoorState
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 TINY = ("--points", "128", "--batch", "2", "--repeats", "1", "--threads", "1")
@@ -55,12 +46,6 @@ def stored(folder: Path, name: str) -> tuple[dict[str, Any], list[dict[str, Any]
     content = json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))
     rows = [row for group in content["groups"].values() for row in group["rows"]]
     return content["settings"], rows, (folder / f"{name}.md").read_text(encoding="utf-8")
-
-
-@pytest.fixture(scope="module")
-def fuzzer(tmp_path_factory: pytest.TempPathFactory) -> Fuzzer:
-    """Every reader and the service, in this process."""
-    return Fuzzer(tmp_path_factory.mktemp("fuzzer") / "scratch")
 
 
 @pytest.fixture(scope="module")
@@ -343,83 +328,3 @@ def test_the_service_is_loaded_by_every_number_of_clients(tmp_path: Path) -> Non
         assert min(row["memory_mib"]) > 100
     assert "| 3 |" in markdown
     assert "The service under load" in output
-
-
-def test_bad_input_is_counted_by_what_becomes_of_it(tmp_path: Path) -> None:
-    code, output, errors = run("fuzz", "--inputs", 60, "--first", 7, "--out", tmp_path)
-    assert (code, errors) == (0, "")
-    settings, rows, markdown = stored(tmp_path, "fuzz")
-    assert settings["first"] == 7
-    assert [row["target"] for row in rows] == list(TARGETS)
-    assert sum(row[outcome] for row in rows for outcome in OUTCOMES) == 60
-    assert sum(row["refused"] for row in rows) > 20
-    assert sum(row["answered"] for row in rows) > 0
-    assert "| all | 60 |" in markdown
-    assert "Bad input" in output
-
-
-@pytest.mark.parametrize("target", [*BAG_SUFFIXES, BAG_FOLDER, CAMERA, *MESSAGES])
-def test_some_inputs_of_every_target_are_good(target: str, fuzzer: Fuzzer) -> None:
-    rng = np.random.default_rng(0)
-    outcomes = {fuzzer.judge(target, fuzzer.draw_for(target, rng), rng)[0] for _ in range(60)}
-    assert {"answered", "refused"} <= outcomes <= {"answered", "no state", "refused"}
-
-
-def test_inputs_that_make_something_fail_are_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(fuzz, "Worker", Careless)
-    rows = fuzz.measure(0, 40, None, 1, tmp_path, no_progress)
-    failures = {failure["number"]: failure for row in rows for failure in row["failures"]}
-    assert set(failures) == set(range(0, 40, 10))
-    assert {failure["outcome"] for failure in failures.values()} == {"crash"}
-    assert "killed by SIGSEGV" in failures[0]["detail"]
-    assert "0: crash, killed by SIGSEGV" in fuzz.fuzz_table(rows, 0).to_markdown()
-    assert sorted(int(path.name.partition("-")[0]) for path in tmp_path.iterdir()) == sorted(failures)
-
-
-class Careless:
-    """A worker whose reader dies of every tenth input."""
-
-    def __init__(self, factory: object, scratch: Path) -> None:
-        self._dead = False
-
-    def call(self, method: str, number: int) -> Any:
-        assert not self._dead
-        if method == "draw":
-            return ".pcd", (".pcd", b"content")
-        if number % 10 == 0:
-            self._dead = True
-            raise RunError("killed by SIGSEGV")
-        return ".pcd", "refused", ""
-
-    def close(self) -> None:
-        """Nothing runs."""
-
-
-@pytest.mark.parametrize(
-    ("fault", "outcome"),
-    [("raise ValueError", "crash"), ("warn", "crash"), ("spin", "hang"), ("answer", "answer without data")],
-)
-def test_the_fuzzer_sees_what_it_looks_for(
-    fault: str, outcome: str, fuzzer: Fuzzer, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def parse(data: bytes, suffix: str, options: object) -> np.ndarray:
-        if fault == "raise ValueError":
-            raise ValueError(fault)
-        if fault == "warn":
-            warnings.warn("look here", RuntimeWarning, stacklevel=1)
-        if fault == "spin":
-            until = time.process_time() + 0.1
-            while time.process_time() < until:
-                pass
-        return np.full((200, 3), np.nan, np.float32)
-
-    def careless(points: np.ndarray) -> Prediction:
-        return Prediction(DoorState.OPEN, {"open": 1.0}, 0, 0.0)
-
-    monkeypatch.setattr("benchmarks.fuzzer.parse_cloud", parse)
-    monkeypatch.setattr("benchmarks.fuzzer.LIMIT_S", 0.1)
-    if fault == "answer":
-        monkeypatch.setattr(fuzzer, "_predict", careless)
-        monkeypatch.setattr(fuzzer, "_gated", careless)
-    number = next(number for number in range(100) if fuzzer.draw(number)[0] == ".pcd")
-    assert fuzzer.attempt(number)[:2] == (".pcd", outcome)

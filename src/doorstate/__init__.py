@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from doorstate.inference.prediction import Prediction
     from doorstate.inference.predictor import Predictor
     from doorstate.inference.stream import StateFilter, wait_for
-    from doorstate.io.readers import ReadOptions, read_cloud
+    from doorstate.io.options import ReadOptions
+    from doorstate.io.readers import read_cloud
     from doorstate.networks import create_network, list_networks
     from doorstate.types import DoorState
 
@@ -39,7 +40,7 @@ _HOME = {
     "Gate": "doorstate.inference.gate",
     "Prediction": "doorstate.inference.prediction",
     "Predictor": "doorstate.inference.predictor",
-    "ReadOptions": "doorstate.io.readers",
+    "ReadOptions": "doorstate.io.options",
     "StateFilter": "doorstate.inference.stream",
     "create_network": "doorstate.networks",
     "list_networks": "doorstate.networks",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The words of the library (docs/concepts.md): states, parts, array aliases.
+"""Shared vocabulary (docs/concepts.md): door states, parts of a scene, units, array types.
 
 Frame of every cloud: sensor frame, gravity-aligned, x forward, y left, z up (ROS REP 103), origin at the camera,
 metres.
@@ -19,7 +19,7 @@ Indices = NDArray[np.int64]
 
 
 class DoorState(IntEnum):
-    """What a door is; the value is the class label of every network."""
+    """State of a door; the value is the class label of every network."""
 
     CLOSED = 0
     SEMI_OPEN = 1
@@ -27,20 +27,21 @@ class DoorState(IntEnum):
 
     @property
     def label(self) -> str:
-        """Name used in files and on the command line: `closed`, `semi_open` or `open`."""
+        """Name in files: `closed`, `semi_open` or `open`."""
         return self.name.lower()
 
 
 STATES: tuple[str, ...] = tuple(state.label for state in DoorState)
-NO_DOOR: Final = "no_door"  # the label of a scene without one; no class of the networks
-DOOR, PARTS = "door", "parts"  # answers besides the state that several rooms name
-DECISION_THRESHOLD = 0.5  # from here on a probability of yes is a yes
-ABSTAINED = "abstained"  # of a method that says so rather than guess
+NO_DOOR: Final = "no_door"  # label of a scene without a door; not a class of the networks
+DOOR, PARTS = "door", "parts"  # names of heads that several packages use
+DECISION_THRESHOLD = 0.5  # a probability of at least this is a yes
+ABSTAINED = "abstained"  # label of a prediction without a state
 PREDICTED_LABELS: tuple[str, ...] = (*STATES, ABSTAINED)
+UNITS_M = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "km": 1000.0}  # metres per unit, by name
 
 
 class Part(IntEnum):
-    """What a simulated point belongs to."""
+    """Part of the scene that a simulated point lies on."""
 
     WALL = 0
     FRAME = 1
@@ -48,4 +49,4 @@ class Part(IntEnum):
     FLOOR = 3
     CEILING = 4
     OTHER = 5
-    NONE = 255  # a pixel that measured nothing
+    NONE = 255  # a pixel without a measurement

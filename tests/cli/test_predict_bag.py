@@ -13,11 +13,10 @@ import pytest
 
 pytest.importorskip("rosbags")
 
-from benchmarks.bags import START_NS, Message, camera_info, cloud, image, write_bag
-
 from doorstate.networks import create_network
 from doorstate.networks.weights import WeightsCard, save_weights
 from doorstate.types import STATES
+from tests.bag_writer import START_NS, Message, camera_info, cloud, image, write_bag
 from tests.cli.helpers import Run, check_error
 from tests.hand_made_clouds import image_of_a_rough_wall
 

@@ -101,7 +101,7 @@ def test_large_page_warns(view: Run, folder: Path, tmp_path: Path, monkeypatch: 
 
 def test_bag_is_shown(view: Run, tmp_path: Path) -> None:
     pytest.importorskip("rosbags")
-    from benchmarks.bags import START_NS, cloud, write_bag
+    from tests.bag_writer import START_NS, cloud, write_bag
 
     messages = [cloud("/points", CLOUD, START_NS + k * 10**9) for k in range(3)]
     for message in messages:
@@ -159,7 +159,7 @@ def test_folder_is_shown_live_until_ctrl_c(view: Run, folder: Path, opened: list
 
 def test_bag_is_shown_live_to_its_end(view: Run, tmp_path: Path) -> None:
     pytest.importorskip("rosbags")
-    from benchmarks.bags import START_NS, cloud, write_bag
+    from tests.bag_writer import START_NS, cloud, write_bag
 
     bag = write_bag(tmp_path, "db3", [cloud("/points", CLOUD, START_NS + k * 10**7) for k in range(4)])
     (code, _, _), events = live(view, "event: end", "--bag", bag, "--every", 2, "--no-open")

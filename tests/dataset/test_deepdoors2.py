@@ -19,7 +19,7 @@ from doorstate.dataset.prepare import Preparation, prepare_dataset
 from doorstate.errors import CameraError, CloudReadError, ConfigError, DatasetError
 from doorstate.io.camera import Intrinsics, Pinhole
 from doorstate.io.depth import depth_to_points
-from doorstate.io.readers import ReadOptions
+from doorstate.io.options import ReadOptions
 from doorstate.simulation.scene import Door, build_scene
 from doorstate.simulation.sensor import CameraPose, render
 from doorstate.types import Part

@@ -14,7 +14,7 @@ from doorstate.dataset.class_folders import label_of_folder
 from doorstate.dataset.labelled import INDEX, check_column, labelled_frames
 from doorstate.errors import CameraError, CloudReadError, ConfigError, DatasetError
 from doorstate.io.camera import Pinhole
-from doorstate.io.readers import ReadOptions
+from doorstate.io.options import ReadOptions
 
 REAL = Path(__file__).resolve().parents[2].parent / "shared" / "real"
 CLOUD = "1 2 3\n4 5 6\n"

@@ -16,8 +16,9 @@ from doorstate.dataset.prepare import REJECTED, Preparation, prepare_dataset
 from doorstate.dataset.store import CLOUDS, DESCRIPTION, MANIFEST, PARTS, open_dataset
 from doorstate.dataset.strata import distance_band, region
 from doorstate.errors import ConfigError, DatasetError
+from doorstate.io.options import ReadOptions
 from doorstate.io.pcd import write_pcd
-from doorstate.io.readers import ReadOptions, read_cloud
+from doorstate.io.readers import read_cloud
 from doorstate.simulation.frames import replay
 from doorstate.simulation.manifest import unflatten
 from doorstate.types import STATES, Part

@@ -17,7 +17,8 @@ from doorstate.errors import ConfigError
 from doorstate.inference.gate import Gate
 from doorstate.inference.network_predictor import NetworkPredictor
 from doorstate.io.camera import Pinhole
-from doorstate.io.readers import ReadOptions, read_cloud
+from doorstate.io.options import ReadOptions
+from doorstate.io.readers import read_cloud
 from doorstate.simulation.frames import replay
 from doorstate.simulation.manifest import unflatten
 from doorstate.types import Points

@@ -22,8 +22,9 @@ from doorstate.inference.rule_predictor import RulePredictor
 from doorstate.inference.stream import wait_for
 from doorstate.inference.watch import DoorReport, DoorWatch
 from doorstate.inference.watch_settings import WatchSettings, parse_settings
+from doorstate.io.body_frame import points_in_body
 from doorstate.io.depth import undo_roll
-from doorstate.io.readers import ReadOptions, points_in_body
+from doorstate.io.options import ReadOptions
 from doorstate.types import STATES, DoorState, Points
 
 POINTS = 512

@@ -55,9 +55,9 @@ def test_points_go_before_depth() -> None:
 
 
 def test_an_undecided_archive_lists_its_arrays() -> None:
-    with pytest.raises(CloudReadError, match="holds left, right: name the array to read points or cloud"):
+    with pytest.raises(CloudReadError, match="left, right"):
         parse_npz(_npz(left=POINTS, right=POINTS))
-    with pytest.raises(CloudReadError, match="holds no arrays"):
+    with pytest.raises(CloudReadError, match="no arrays"):
         parse_npz(_npz())
 
 
@@ -74,7 +74,7 @@ def test_an_undecided_archive_lists_its_arrays() -> None:
     ids=lambda array: str(array.dtype),
 )
 def test_other_kinds_of_values_are_refused(array: NDArray[Any]) -> None:
-    with pytest.raises(CloudReadError, match="values: save float32 metres"):
+    with pytest.raises(CloudReadError, match=r"holds .* values"):
         parse_npy(_npy(array))
 
 

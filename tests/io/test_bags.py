@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Bags of ROS 1 and ROS 2: rosbags writes, we read; frames, cameras, stamps, topics; damaged bags."""
+"""ROS 1 and ROS 2 bags written by rosbags: frames, cameras, stamps, topics; damaged bags."""
 
 from __future__ import annotations
 
@@ -18,7 +18,13 @@ from PIL import Image
 
 pytest.importorskip("rosbags")
 
-from benchmarks.bags import (
+from doorstate.errors import CameraError, CloudReadError, DoorstateError, MissingExtraError
+from doorstate.io import bag_limits
+from doorstate.io.bags import BagTopic, StampedCloud, open_bag
+from doorstate.io.camera import Intrinsics, Pinhole
+from doorstate.io.depth import depth_to_points
+from doorstate.io.options import ReadOptions
+from tests.bag_writer import (
     KINDS,
     START_NS,
     Message,
@@ -29,13 +35,6 @@ from benchmarks.bags import (
     text,
     write_bag,
 )
-
-from doorstate.errors import CameraError, CloudReadError, DoorstateError, MissingExtraError
-from doorstate.io import bag_limits
-from doorstate.io.bags import BagTopic, StampedCloud, open_bag
-from doorstate.io.camera import Intrinsics, Pinhole
-from doorstate.io.depth import depth_to_points
-from doorstate.io.readers import ReadOptions
 
 ORGANIZED = np.random.default_rng(0).normal(2, 1, (6, 8, 3)).astype(np.float32)
 ORGANIZED[1, 2] = np.nan
@@ -63,11 +62,13 @@ def read_one(path: Path, options: ReadOptions | None = None, **more: Any) -> NDA
     return only.cloud
 
 
-def complaint(path: Path, name: str | None = None, **more: Any) -> str:
+def read_error(path: Path, name: str | None = None) -> DoorstateError:
+    """Return the error of a bag, after checking that it is one line."""
     with pytest.raises(DoorstateError) as caught:
-        read(path, name, **more)
-    assert "\n" not in str(caught.value)
-    return str(caught.value)
+        read(path, name)
+    assert caught.value.path == path
+    assert str(caught.value).isprintable()
+    return caught.value
 
 
 def png(pixels: NDArray[np.uint16]) -> bytes:
@@ -77,7 +78,7 @@ def png(pixels: NDArray[np.uint16]) -> bytes:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_clouds_come_back_with_stamps_in_order(kind: str, tmp_path: Path) -> None:
+def test_clouds_are_read_in_order_with_their_stamps(kind: str, tmp_path: Path) -> None:
     flat = ORGANIZED.reshape(-1, 3)
     messages = [
         cloud("/points", ORGANIZED, START_NS + 100_000_000),
@@ -105,7 +106,7 @@ def test_one_file_of_a_ros2_folder_is_enough(kind: str, tmp_path: Path) -> None:
     folder = write_bag(tmp_path, kind, [cloud("/points", ORGANIZED)])
     (folder / "metadata.yaml").unlink()
     np.testing.assert_array_equal(read_one(folder / f"{folder.name}.{kind}"), ORGANIZED)
-    assert "has no metadata.yaml" in complaint(folder)
+    assert "metadata.yaml" in read_error(folder).message
 
 
 COMPRESSED = [("bag", "LZ4"), ("bag", "BZ2"), ("db3", "MESSAGE"), ("mcap", "STORAGE")]
@@ -123,7 +124,7 @@ def test_one_file_of_a_folder_with_compressed_messages_is_enough(tmp_path: Path)
 
 
 @pytest.mark.parametrize(("kind", "compression"), COMPRESSED)
-def test_what_unpacks_to_more_than_a_message_holds_is_refused(
+def test_data_that_unpacks_to_more_than_a_message_is_refused(
     kind: str, compression: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = write_bag(tmp_path, kind, [cloud("/points", np.zeros((60, 80, 3)))], compression)
@@ -133,13 +134,13 @@ def test_what_unpacks_to_more_than_a_message_holds_is_refused(
 
 
 @pytest.mark.parametrize(("kind", "compression"), COMPRESSED)
-def test_what_is_packed_must_end(
+def test_truncated_packed_data_is_refused(
     kind: str, compression: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = write_bag(tmp_path, kind, [cloud("/points", ORGANIZED)], compression)
     unpack = bag_limits._unpack
     monkeypatch.setattr(bag_limits, "_unpack", lambda new, packed: unpack(new, packed[:-5]))
-    with pytest.raises(CloudReadError, match="what is packed does not end"):
+    with pytest.raises(CloudReadError, match="truncated"):
         read_one(path)
 
 
@@ -149,9 +150,9 @@ def test_what_is_packed_must_end(
         ("UPDATE messages SET timestamp = NULL", "damaged from here on"),
         ("UPDATE messages SET timestamp = 'now'", "damaged, or no bag"),
         ("UPDATE messages SET data = 'text'", "damaged message"),
-        ("UPDATE topics SET name = NULL WHERE name = '/points'", "none of its 1 topics"),
-        ("UPDATE topics SET type = 3", "none of its 2 topics"),
-        # A view computes whatever it likes, without end.
+        ("UPDATE topics SET name = NULL WHERE name = '/points'", "none of the 1 topics"),
+        ("UPDATE topics SET type = 3", "none of the 2 topics"),
+        # A view may compute without end.
         (
             "DROP TABLE schema; CREATE VIEW schema AS WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n)"
             " SELECT i AS schema_version FROM n WHERE i < 0",
@@ -159,7 +160,7 @@ def test_what_is_packed_must_end(
         ),
     ],
 )
-def test_a_database_holds_what_it_likes(change: str, reason: str, tmp_path: Path) -> None:
+def test_databases_with_other_types_and_views_are_refused(change: str, reason: str, tmp_path: Path) -> None:
     folder = write_bag(tmp_path, "db3", [cloud("/points", ORGANIZED), text("/chatter")])
     file = folder / f"{folder.name}.db3"
     with closing(sqlite3.connect(file)) as database:
@@ -179,21 +180,21 @@ CREATE TABLE new AS SELECT * FROM topics; DROP TABLE topics; ALTER TABLE new REN
 @pytest.mark.parametrize(
     "added", ["  x: [&a 1, *a]", "  x: &a [1]\n  y: {<<: *a}"], ids=["an alias", "a merge of one"]
 )
-def test_metadata_that_refer_to_themselves_are_refused(added: str, tmp_path: Path) -> None:
+def test_metadata_with_aliases_are_refused(added: str, tmp_path: Path) -> None:
     folder = write_bag(tmp_path, "mcap", [cloud("/points", ORGANIZED)])
     metadata = folder / "metadata.yaml"
     metadata.write_text(metadata.read_text() + f"{added}\n")
-    assert "refers to itself" in complaint(folder)
+    assert "refers to itself" in read_error(folder).message
 
 
-def test_a_zero_stamp_gives_way_to_the_time_of_recording(tmp_path: Path) -> None:
+def test_zero_stamps_are_replaced_by_the_time_of_recording(tmp_path: Path) -> None:
     path = write_bag(tmp_path, "mcap", [cloud("/points", ORGANIZED, 0)])
     assert read(path)[0].stamp_s == 0.001
 
 
 def test_every_third_message(tmp_path: Path) -> None:
     path = write_bag(tmp_path, "bag", [cloud("/points", ORGANIZED, START_NS + i * 10**9) for i in range(8)])
-    assert [found.stamp_s - START_NS / 1e9 for found in read(path, every=3)] == [0, 3, 6]
+    assert [stamped.stamp_s - START_NS / 1e9 for stamped in read(path, every=3)] == [0, 3, 6]
 
 
 def test_frame_roll_and_units_are_those_of_files(tmp_path: Path) -> None:
@@ -231,13 +232,13 @@ def test_rows_of_images_may_be_padded_and_scales_and_roll_are_taken(tmp_path: Pa
     np.testing.assert_allclose(points, depth_to_points(DEPTH_M * 10, CAMERA, 270), rtol=1e-6)
 
 
-def test_the_camera_may_be_named_or_given(tmp_path: Path) -> None:
+def test_cameras_of_another_topic_and_of_the_options(tmp_path: Path) -> None:
     other = camera_info("/other", 8, 6, (9, 0, 3, 0, 9, 2, 0, 0, 1), [0] * 12)
     path = write_bag(tmp_path, "mcap", [image("/depth/image_raw", DEPTH_MM, "16UC1"), INFO, other])
     with_k = depth_to_points(DEPTH_M, Intrinsics(8, 6, 9, 9, 3, 2))
     np.testing.assert_allclose(read_one(path, camera_info_topic="/other"), with_k, rtol=1e-6)
-    for given in (Pinhole(9, 9, 3, 2), Intrinsics(8, 6, 9, 9, 3, 2)):
-        np.testing.assert_allclose(read_one(path, ReadOptions(intrinsics=given)), with_k, rtol=1e-6)
+    for camera in (Pinhole(9, 9, 3, 2), Intrinsics(8, 6, 9, 9, 3, 2)):
+        np.testing.assert_allclose(read_one(path, ReadOptions(intrinsics=camera)), with_k, rtol=1e-6)
 
 
 def test_rectified_images_are_of_the_camera_p(tmp_path: Path) -> None:
@@ -273,31 +274,29 @@ def test_a_bag_with_one_usable_topic_needs_no_name(tmp_path: Path) -> None:
     jpeg = compressed_image("/colour/image_raw/compressed", b"\xff\xd8", "rgb8; jpeg compressed bgr8")
     path = write_bag(tmp_path, "mcap", [colour, jpeg, text("/chatter"), cloud("/points", ORGANIZED)])
     np.testing.assert_array_equal(read_one(path), ORGANIZED)
-    wanted = "usable are: /points (PointCloud2, 1)"
     for name, reason in (
-        ("/gone", "topic /gone is not in this bag"),
-        ("/chatter", "topic /chatter holds String messages"),
-        ("/colour/image_raw", "is an image in rgb8, not depth"),
-        ("/colour/image_raw/compressed", "not compressedDepth"),
+        ("/gone", "/gone"),
+        ("/chatter", "String"),
+        ("/colour/image_raw", "rgb8"),
+        ("/colour/image_raw/compressed", "jpeg"),
     ):
-        said = complaint(path, name)
-        assert reason in said
-        assert said.endswith(wanted)
+        error = read_error(path, name)
+        assert (error.field, error.expected) == ("topic", "/points (PointCloud2, 1)")
+        assert reason in error.message
 
 
 def test_several_usable_topics_are_listed(tmp_path: Path) -> None:
     depth = image("/depth/image_raw", DEPTH_MM, "16UC1")
-    said = complaint(write_bag(tmp_path, "bag", [cloud("/points", ORGANIZED), depth, INFO]))
-    assert said == (
-        "test.bag: say by --topic which to read: /depth/image_raw (Image, 1), /points (PointCloud2, 1)"
-    )
+    error = read_error(write_bag(tmp_path, "bag", [cloud("/points", ORGANIZED), depth, INFO]))
+    assert error.field == "topic"
+    assert error.expected == "/depth/image_raw (Image, 1), /points (PointCloud2, 1)"
 
 
-def test_no_usable_topic_is_said(tmp_path: Path) -> None:
+def test_bags_without_readable_topics_are_errors(tmp_path: Path) -> None:
     rvl = compressed_image("/depth/compressedDepth", b"", "16UC1; compressedDepth rvl")
     path = write_bag(tmp_path, "mcap", [text("/chatter"), rvl])
-    assert "none of its 2 topics holds clouds or depth images" in complaint(path)
-    assert "only PNG can be read" in complaint(path, "/depth/compressedDepth")
+    assert (read_error(path).field, read_error(path).expected) == ("topic", None)
+    assert "rvl" in read_error(path, "/depth/compressedDepth").message
 
 
 @pytest.mark.parametrize(
@@ -305,10 +304,10 @@ def test_no_usable_topic_is_said(tmp_path: Path) -> None:
     [
         (text("/depth/camera_info"), "no CameraInfo in /depth/camera_info"),
         (camera_info("/elsewhere/camera_info", 8, 6, K, P), "no CameraInfo in /depth/camera_info"),
-        (camera_info("/depth/camera_info", 8, 6, [0] * 9, [0] * 12), "/depth/camera_info: fx = 0.0 pixels"),
+        (camera_info("/depth/camera_info", 8, 6, [0] * 9, [0] * 12), "/depth/camera_info: fx"),
     ],
 )
-def test_depth_images_without_a_camera_are_one_line(info: Message, reason: str, tmp_path: Path) -> None:
+def test_depth_images_without_a_camera_are_camera_errors(info: Message, reason: str, tmp_path: Path) -> None:
     path = write_bag(tmp_path, "mcap", [image("/depth/image_raw", DEPTH_MM, "16UC1"), info])
     with pytest.raises(CameraError, match=reason):
         read(path)
@@ -322,9 +321,9 @@ def test_depth_images_without_a_camera_are_one_line(info: Message, reason: str, 
         (image("/t", DEPTH_MM, "rgb8"), "is an image in rgb8"),
         (
             image("/t", DEPTH_MM, "16UC1", START_NS, height=7),
-            "is truncated: 112 bytes are declared, 96 are there",
+            "112 bytes are declared",
         ),
-        (image("/t", DEPTH_MM, "16UC1", START_NS, step=15), "6 rows of 8 pixels in 15 bytes"),
+        (image("/t", DEPTH_MM, "16UC1", START_NS, step=15), "6 rows of 8 pixels"),
         (image("/t", DEPTH_MM, "16UC1", START_NS, height=0), "is damaged: 0 rows"),
         (image("/t", DEPTH_MM[:, :4], "16UC1", START_NS), "the image has 4 x 6 pixels"),
         (compressed_image("/t", b"short", "16UC1; compressedDepth", START_NS), "is no PNG"),
@@ -334,7 +333,7 @@ def test_depth_images_without_a_camera_are_one_line(info: Message, reason: str, 
         ),
     ],
 )
-def test_one_bad_message_is_no_end(bad: Message, reason: str, tmp_path: Path) -> None:
+def test_messages_after_a_damaged_one_are_read(bad: Message, reason: str, tmp_path: Path) -> None:
     good = {
         "PointCloud2": cloud("/t", ORGANIZED),
         "Image": image("/t", DEPTH_MM, "16UC1"),
@@ -353,13 +352,13 @@ def test_one_bad_message_is_no_end(bad: Message, reason: str, tmp_path: Path) ->
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("part", [0, 0.001, 0.5, 0.999])
-def test_a_truncated_bag_is_one_line(kind: str, part: float, tmp_path: Path) -> None:
+def test_truncated_bags_are_errors(kind: str, part: float, tmp_path: Path) -> None:
     clouds = [cloud("/points", np.ones((60, 80, 3)), START_NS + i) for i in range(4)]
     path = write_bag(tmp_path, kind, clouds)
     file = path if path.is_file() else path / f"{path.name}.{kind}"
     content = file.read_bytes()
     file.write_bytes(content[: int(part * len(content))])
-    assert complaint(path, "/points").startswith(f"{path.name}: damaged")
+    assert read_error(path, "/points").message.startswith("damaged")
 
 
 def test_messages_before_the_damage_are_read(tmp_path: Path) -> None:
@@ -373,19 +372,19 @@ def test_messages_before_the_damage_are_read(tmp_path: Path) -> None:
             list(clouds)
 
 
-def test_what_is_no_bag_is_one_line(tmp_path: Path) -> None:
-    assert "no such file" in complaint(tmp_path / "gone.bag")
+def test_other_files_are_not_bags(tmp_path: Path) -> None:
+    assert "no such file" in read_error(tmp_path / "gone.bag").message
     (tmp_path / "cloud.pcd").write_bytes(b"")
-    assert "give a .bag, .db3 or .mcap file" in complaint(tmp_path / "cloud.pcd")
+    assert ".bag .db3 .mcap" in str(read_error(tmp_path / "cloud.pcd").expected)
     for name in ("a.bag", "a.db3", "a.mcap"):
         (tmp_path / name).write_bytes(b"garbage" * 1000)
-        assert f"{name}: damaged, or no bag" in complaint(tmp_path / name)
+        assert "damaged" in read_error(tmp_path / name).message
     (tmp_path / "folder").mkdir()
     (tmp_path / "folder" / "metadata.yaml").write_text("[")
-    assert "folder: damaged, or no bag" in complaint(tmp_path / "folder")
+    assert "damaged" in read_error(tmp_path / "folder").message
 
 
-def test_without_rosbags_it_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_rosbags_is_named_in_the_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "rosbags.rosbag1", None)
-    with pytest.raises(MissingExtraError, match="pip install rosbags"):
+    with pytest.raises(MissingExtraError, match="rosbags"):
         read(tmp_path / "a.bag")

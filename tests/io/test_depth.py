@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Depth to points: hand-worked pixels, the frames of REP 103, and a camera that lies on its side."""
+"""Depth to points: pixels computed by hand, the frames of REP 103, and rolled cameras."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def _frames(draw: st.DrawFn) -> tuple[NDArray[np.float32], Intrinsics]:
     return draw(npst.arrays(np.float32, (camera.height, camera.width), elements=values)), camera
 
 
-def test_hand_worked_pixels() -> None:
+def test_pixels_computed_by_hand() -> None:
     points = depth_to_points(np.full((3, 4), 2.0), SMALL)
     assert points.shape == (3, 4, 3)
     assert points.dtype == np.float32
@@ -46,7 +46,7 @@ def test_hand_worked_pixels() -> None:
     assert points[2, 3].tolist() == [2.0, -1.5, -0.5]
 
 
-def test_no_return_is_nan_and_the_input_is_left_alone() -> None:
+def test_missing_depth_is_nan_and_the_input_is_unchanged() -> None:
     depth_m = np.array(
         [[np.nan, 0.0, -1.0, np.inf], [-np.inf, 1.0, 1.0, 1.0], [1.0, 1.0, 1.0, 1.0]], np.float32
     )
@@ -84,7 +84,7 @@ def test_is_the_plain_loop_in_float64_bit_for_bit(frame: tuple[NDArray[np.float3
             np.testing.assert_array_equal(points[v, u], np.array(expected).astype(np.float32))
 
 
-def test_what_overflows_is_no_return_and_no_warning() -> None:
+def test_overflow_is_infinite_and_does_not_warn() -> None:
     camera = Intrinsics(width=4, height=3, fx=1e-300, fy=1.0, cx=1e300, cy=1e300)
     points = depth_to_points(np.full((3, 4), 2.0, np.float32), camera)
     assert np.isinf(points[..., 1:]).all()

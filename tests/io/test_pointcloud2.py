@@ -106,7 +106,7 @@ def test_doubles_beyond_float32_are_infinite() -> None:
 
 
 @pytest.mark.parametrize("row_step", [0, 12, 35, 37, 10**9])
-def test_points_that_fill_the_data_are_read_whatever_row_step_a_driver_left(row_step: int) -> None:
+def test_points_that_fill_the_data_are_read_with_a_wrong_row_step(row_step: int) -> None:
     np.testing.assert_array_equal(
         points_from_pointcloud2(**MESSAGE | {"row_step": row_step}), points_from_pointcloud2(**MESSAGE)
     )
@@ -119,13 +119,13 @@ def test_no_points_are_an_empty_cloud(extent: tuple[int, int]) -> None:
 
 
 @pytest.mark.parametrize(
-    ("wrong", "complaint"),
+    ("wrong", "reason"),
     [
         ({"fields": []}, "has the fields none"),
-        ({"fields": PACKED[:2]}, "has the fields x y: x, y and z are needed"),
-        ({"fields": [*PACKED[:2], Field("z", 8, 6)]}, "has 1 of datatype 6 as z"),
-        ({"fields": [*PACKED[:2], Field("z", 8, 7, 0)]}, "has 0 of datatype 7 as z"),
-        ({"fields": [Field("x", 0, 7, 3), *PACKED[1:]]}, "has 3 of datatype 7 as x"),
+        ({"fields": PACKED[:2]}, "has the fields x y"),
+        ({"fields": [*PACKED[:2], Field("z", 8, 6)]}, "1 values of datatype 6 as z"),
+        ({"fields": [*PACKED[:2], Field("z", 8, 7, 0)]}, "0 values of datatype 7 as z"),
+        ({"fields": [Field("x", 0, 7, 3), *PACKED[1:]]}, "3 values of datatype 7 as x"),
         ({"fields": [*PACKED[:2], Field("z", 9, 7)]}, "z at byte 9 is not within 12 bytes"),
         ({"fields": [*PACKED[:2], Field("z", 8, 8)]}, "z at byte 8 is not within 12 bytes"),
         ({"fields": [Field("x", -1, 7), *PACKED[1:]]}, "x at byte -1 is not within 12 bytes"),
@@ -141,8 +141,8 @@ def test_no_points_are_an_empty_cloud(extent: tuple[int, int]) -> None:
         ({"point_step": -12}, "in steps of -12"),
     ],
 )
-def test_a_message_that_contradicts_itself_is_one_line(wrong: dict[str, Any], complaint: str) -> None:
+def test_contradictory_messages_are_read_errors(wrong: dict[str, Any], reason: str) -> None:
     with pytest.raises(CloudReadError) as caught:
         points_from_pointcloud2(**MESSAGE | wrong)
-    assert complaint in str(caught.value)
-    assert "\n" not in str(caught.value)
+    assert reason in str(caught.value)
+    assert str(caught.value).isprintable()

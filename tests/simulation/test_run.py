@@ -14,7 +14,8 @@ import pytest
 from PIL import Image
 
 from doorstate.errors import ConfigError, DatasetError
-from doorstate.io.readers import ReadOptions, read_cloud
+from doorstate.io.options import ReadOptions
+from doorstate.io.readers import read_cloud
 from doorstate.simulation.frames import replay
 from doorstate.simulation.generate import PRESETS, pose_indices
 from doorstate.simulation.manifest import unflatten

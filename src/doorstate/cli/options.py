@@ -12,7 +12,7 @@ import typer
 from doorstate.errors import CameraError, ConfigError
 
 if TYPE_CHECKING:
-    from doorstate.io.readers import ReadOptions
+    from doorstate.io.options import ReadOptions
 
 # How cloud files and depth images are read.
 Frame = Annotated[
@@ -128,16 +128,20 @@ def read_options(
     Raises:
         ConfigError: an option has no such value, or options exclude each other.
     """
-    from doorstate.io.camera import read_intrinsics
-    from doorstate.io.readers import options_from_flags
+    from doorstate.io.camera import pinhole_from_numbers, read_intrinsics
+    from doorstate.io.options import ReadOptions, metres_per_unit
 
     if layout is not None and (frame, roll, units, depth_scale) != ("body", 0, "m", 0.001):
         raise ConfigError("--frame, --roll, --units and --depth-scale cannot be combined with --layout")
     intrinsics = None if intrinsics_file is None else read_intrinsics(intrinsics_file)
     try:
-        return options_from_flags(frame, roll, units, depth_scale, intrinsics, flags)
+        pinhole = pinhole_from_numbers(*flags)
+        if intrinsics is not None and pinhole is not None:
+            raise ConfigError("give either --intrinsics or --fx --fy --cx --cy")
+        camera = intrinsics or pinhole
+        return ReadOptions(frame, roll, camera, depth_scale, metres_per_unit(units))  # type: ignore[arg-type]
     except CameraError as error:  # typed values are usage errors, unlike those of a camera file
-        raise ConfigError(error.describe()) from error
+        raise ConfigError(error.message, field=error.field, expected=error.expected) from error
 
 
 def split_names(text: str | None) -> tuple[str, ...] | None:

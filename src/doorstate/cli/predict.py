@@ -33,7 +33,7 @@ from doorstate.errors import ConfigError, DoorstateError
 
 if TYPE_CHECKING:
     from doorstate.inference.predictor import Predictor
-    from doorstate.io.readers import ReadOptions
+    from doorstate.io.options import ReadOptions
 
 
 def predict(
@@ -81,7 +81,7 @@ def predict(
     """
     from doorstate.cli.predict_bag import predict_bag
     from doorstate.cli.predictors import load_predictor
-    from doorstate.io.readers import find_clouds
+    from doorstate.io.find import find_clouds
 
     check_source(files, bag)
     if bag is None and (topic, camera_info_topic, every) != (None, None, 1):

@@ -16,7 +16,7 @@ from doorstate.errors import CloudReadError, DoorstateError
 if TYPE_CHECKING:
     from doorstate.inference.predictor import Predictor
     from doorstate.io.bags import BagTopic, StampedCloud
-    from doorstate.io.readers import ReadOptions
+    from doorstate.io.options import ReadOptions
 
 
 def predict_bag(

@@ -31,7 +31,7 @@ from doorstate.cli.options import (
 from doorstate.errors import ConfigError
 
 if TYPE_CHECKING:
-    from doorstate.io.readers import ReadOptions
+    from doorstate.io.options import ReadOptions
     from doorstate.viewer.named_clouds import NamedCloud
 
 _FOLDER_RATE_HZ = 5.0

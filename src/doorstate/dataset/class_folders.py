@@ -13,7 +13,7 @@ from typing import TypeVar
 from doorstate._files import read_csv
 from doorstate.dataset.strata import distance_band, polar, region
 from doorstate.errors import DatasetError
-from doorstate.io.readers import find_clouds
+from doorstate.io.find import find_clouds
 from doorstate.types import NO_DOOR, DoorState
 
 # Order matters: "semi-open" and "half closed" hold the other words too.

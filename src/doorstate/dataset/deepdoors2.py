@@ -27,8 +27,9 @@ from doorstate.dataset.class_folders import nearest, row_of, state_of_folder
 from doorstate.errors import CloudReadError, DatasetError, DoorstateError
 from doorstate.io.camera import Intrinsics, Pinhole
 from doorstate.io.depth import depth_to_points
+from doorstate.io.find import find_clouds
+from doorstate.io.options import ReadOptions
 from doorstate.io.png import parse_coarse_png
-from doorstate.io.readers import ReadOptions, find_clouds
 from doorstate.types import Points
 
 CAMERA = Intrinsics(640, 480, 384.681, 384.681, 319.226, 242.138)

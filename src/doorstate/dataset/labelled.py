@@ -14,7 +14,9 @@ from doorstate.dataset.class_folders import label_of_folder, nearest, row_of
 from doorstate.dataset.layouts import find_layout
 from doorstate.errors import ConfigError, DatasetError
 from doorstate.io.camera import Intrinsics, Pinhole
-from doorstate.io.readers import DEFAULT_OPTIONS, ReadOptions, find_clouds, read_cloud
+from doorstate.io.find import find_clouds
+from doorstate.io.options import DEFAULT_OPTIONS, ReadOptions
+from doorstate.io.readers import read_cloud
 from doorstate.types import Points
 
 INDEX = "index.csv"

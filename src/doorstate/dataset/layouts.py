@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from doorstate.dataset.deepdoors2 import deepdoors2_rows, read_deepdoors2
 from doorstate.errors import ConfigError
-from doorstate.io.readers import ReadOptions
+from doorstate.io.options import ReadOptions
 from doorstate.types import Points
 
 

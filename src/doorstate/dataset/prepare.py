@@ -31,7 +31,8 @@ from doorstate.dataset.store import (
 )
 from doorstate.dataset.strata import distance_band, region
 from doorstate.errors import CameraError, CloudError, ConfigError, DatasetError
-from doorstate.io.readers import ReadOptions, read_cloud
+from doorstate.io.options import ReadOptions
+from doorstate.io.readers import read_cloud
 from doorstate.simulation.frames import depth_sha256, replay
 from doorstate.simulation.manifest import unflatten
 from doorstate.simulation.run import MANIFEST as SIMULATED_MANIFEST

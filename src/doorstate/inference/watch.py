@@ -27,7 +27,7 @@ from doorstate.io.messages import (
     points_from_message,
     stamp_ns_of,
 )
-from doorstate.io.readers import ReadOptions
+from doorstate.io.options import ReadOptions
 from doorstate.rules.base import Detection
 from doorstate.types import DoorState, Points
 

@@ -13,7 +13,8 @@ from doorstate.errors import ConfigError
 from doorstate.inference.gate import DEFAULT_GATE
 from doorstate.inference.predictor import DEFAULT_NETWORK, Predictor
 from doorstate.io.messages import CLOUD, COMPRESSED_IMAGE, IMAGE
-from doorstate.io.readers import UNITS_M, ReadOptions
+from doorstate.io.options import ReadOptions
+from doorstate.types import UNITS_M
 
 MESSAGE_TYPES = {"cloud": CLOUD, "depth": IMAGE, "compressed_depth": COMPRESSED_IMAGE}  # by input
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""NumPy files, .npy and .npz: checked against their own size before allocation, never unpickled."""
+"""NumPy files (.npy, .npz); sizes are checked before allocation, and nothing is unpickled."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from doorstate.errors import CloudReadError
 from doorstate.io.size_limits import MAX_POINTS, check_size
 
-# Names that say what an array is, best first.
+# Names of the array to read in an archive, in order of preference.
 ARRAY_NAMES = ("points", "cloud", "xyz", "depth")
 # Four float64 for every point: an archive member that unpacks to more is a zip bomb.
 _MAX_MEMBER_BYTES = 32 * MAX_POINTS
@@ -25,7 +25,7 @@ def parse_npy(data: bytes) -> NDArray[Any]:
     """Read the array of a .npy file.
 
     Raises:
-        CloudReadError: when it holds objects, text, complex or 8-bit numbers, or fewer than declared.
+        CloudReadError: it holds objects, text, complex or 8-bit numbers, or fewer than declared.
     """
     stream = io.BytesIO(data)
     if npy_format.read_magic(stream) == (1, 0):
@@ -33,7 +33,7 @@ def parse_npy(data: bytes) -> NDArray[Any]:
     else:
         shape, _, dtype = npy_format.read_array_header_2_0(stream)
     if dtype.kind not in "iuf" or dtype.itemsize == 1:
-        raise CloudReadError(f"holds {dtype} values: save float32 metres, or 16-bit depth")
+        raise CloudReadError(f"holds {dtype} values", expected="float32 metres, or 16-bit depth")
     check_size(math.prod(shape) * dtype.itemsize, len(data) - stream.tell(), "bytes")
     stream.seek(0)
     return np.asarray(npy_format.read_array(stream, allow_pickle=False))
@@ -43,7 +43,7 @@ def parse_npz(data: bytes) -> NDArray[Any]:
     """Read the array named points, cloud, xyz or depth of a .npz archive, or its only array.
 
     Raises:
-        CloudReadError: when no name decides, or the array cannot be read.
+        CloudReadError: no array has such a name, or it cannot be read.
     """
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         members = {info.filename.removesuffix(".npy"): info for info in archive.infolist()}
@@ -52,7 +52,7 @@ def parse_npz(data: bytes) -> NDArray[Any]:
             (name,) = members
         if name is None:
             held = ", ".join(members) or "no arrays"
-            raise CloudReadError(f"holds {held}: name the array to read {' or '.join(ARRAY_NAMES)}")
+            raise CloudReadError(f"holds {held}", expected=f"an array named {' or '.join(ARRAY_NAMES)}")
         if members[name].file_size > _MAX_MEMBER_BYTES:
             raise CloudReadError(
                 f"array {name} unpacks to {members[name].file_size} bytes: not one camera frame"

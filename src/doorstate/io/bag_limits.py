@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a bag may ask of the machine: rosbags itself lets a few kB unpack to gigabytes, or keep SQLite busy for ever."""
+"""Limits on bags: rosbags alone would unpack a few kB to gigabytes, or run SQLite without end."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from typing import Any
 from doorstate.io.plain_yaml import plain_documents
 from doorstate.io.size_limits import MAX_POINTS
 
-MAX_UNPACKED = 32 * MAX_POINTS  # bytes of a message, or of a chunk, which is one message at least
+MAX_UNPACKED = 32 * MAX_POINTS  # bytes of a message or of a chunk of messages
 
 
 def unpack_zstd(packed: bytes) -> bytes:
-    """What a Zstandard frame holds.
+    """Unpack a Zstandard frame.
 
     Raises:
-        ValueError: more than any message does, or it is truncated.
+        ValueError: it is truncated, or larger than a message may be.
     """
     if sys.version_info >= (3, 14):
         from compression import zstd
@@ -29,7 +29,7 @@ def unpack_zstd(packed: bytes) -> bytes:
 
 
 def limit_unpacking() -> None:
-    """Have rosbags unpack chunks to `MAX_UNPACKED` bytes and no further, in the whole process."""
+    """Limit the chunks that rosbags unpacks to `MAX_UNPACKED` bytes, in the whole process."""
     from bz2 import BZ2Decompressor
 
     from lz4.frame import LZ4FrameDecompressor
@@ -43,18 +43,19 @@ def limit_unpacking() -> None:
 
 
 def keep_packed(reader: Any) -> None:
-    """Have a reader of ROS 2 hand over single messages as they are stored: `unpack_zstd` unpacks them."""
+    """Make a ROS 2 reader return messages as stored; `unpack_zstd` unpacks them."""
     reader.storage.metadata = reader.storage.metadata._replace(compression_mode=None)
 
 
 @contextmanager
 def limited_sqlite() -> Iterator[None]:
-    """While databases are opened: no views, which may compute without end, and no value larger than a message."""
+    """Refuse views, which may compute without end, and values larger than a message in databases opened meanwhile."""
     import apsw
 
     def limit(connection: Any) -> None:
         connection.limit(apsw.SQLITE_LIMIT_LENGTH, MAX_UNPACKED)
-        connection.authorizer = lambda *asked: apsw.SQLITE_DENY if asked[-1] else apsw.SQLITE_OK
+        # The last argument names the view or trigger that an access comes from.
+        connection.authorizer = lambda *access: apsw.SQLITE_DENY if access[-1] else apsw.SQLITE_OK
 
     apsw.connection_hooks.append(limit)
     try:
@@ -64,17 +65,21 @@ def limited_sqlite() -> Iterator[None]:
 
 
 def check_metadata(folder: Path) -> None:
-    """Raise YAMLError if metadata.yaml refers to itself: nothing that records does so."""
+    """Check that metadata.yaml has no aliases; no recorder writes any.
+
+    Raises:
+        yaml.YAMLError: it has.
+    """
     text = (folder / "metadata.yaml").read_text(encoding="utf-8")
-    if "&" in text:  # without an anchor there is no alias, and rosbags parses too
+    if "&" in text:  # no alias without an anchor; parsing is slow, and rosbags parses again
         list(plain_documents(text))
 
 
-def _unpack(new: Callable[[], Any], packed: bytes) -> bytes:
-    unpacking = new()
+def _unpack(decompressor: Callable[[], Any], packed: bytes) -> bytes:
+    unpacking = decompressor()
     unpacked: bytes = unpacking.decompress(packed, max_length=MAX_UNPACKED + 1)
     if len(unpacked) > MAX_UNPACKED:
         raise ValueError(f"unpacks to more than {MAX_UNPACKED >> 20} MiB: not one camera frame")
     if not unpacking.eof:
-        raise ValueError("what is packed does not end")
+        raise ValueError("the packed data is truncated")
     return unpacked

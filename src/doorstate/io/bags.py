@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Recordings of ROS 1 and ROS 2 (.bag, .db3, .mcap), read cloud by cloud without ROS.
+"""ROS 1 and ROS 2 bags (.bag, .db3, .mcap), read cloud by cloud without ROS.
 
-Messages are read as what they have been since ROS 1: definitions recorded in a bag are not asked, so that nothing else
-in it can keep its clouds from being read.
+Messages are read by the definitions that have been fixed since ROS 1. Definitions recorded in the bag are ignored, so
+that other messages cannot prevent its clouds from being read.
 """
 
 from __future__ import annotations
@@ -33,10 +33,11 @@ from doorstate.io.messages import (
     points_from_message,
     stamp_ns_of,
 )
-from doorstate.io.readers import DEFAULT_OPTIONS, ReadOptions
+from doorstate.io.options import DEFAULT_OPTIONS, ReadOptions
+from doorstate.io.readers import BAG_SUFFIXES
 from doorstate.types import Points
 
-_COMPRESSED_DEPTH = "/compressedDepth"  # how image_transport ends the names of such topics
+_COMPRESSED_DEPTH = "/compressedDepth"  # suffix of topic names by image_transport
 _ZSTD = b"\x28\xb5\x2f\xfd"  # RFC 8878, 3.1.1
 
 
@@ -44,25 +45,25 @@ class BagTopic(NamedTuple):
     """A topic of a bag."""
 
     name: str
-    type: str  # such as sensor_msgs/msg/PointCloud2, in ROS 1 too
+    type: str  # such as sensor_msgs/msg/PointCloud2, also in ROS 1
     messages: int
 
 
 class StampedCloud(NamedTuple):
-    """What one message holds."""
+    """Cloud of one message."""
 
-    stamp_s: float  # of its header; where that is zero, when it was recorded
+    stamp_s: float  # of the header, or the time of recording if that is zero
     frame_id: str
-    cloud: Points | DoorstateError  # (H, W, 3) or (N, 3) in the body frame, or why there is none
+    cloud: Points | DoorstateError  # (H, W, 3) or (N, 3) in the body frame, or the error of a damaged message
 
 
 @contextmanager
 def open_bag(path: Path) -> Iterator[Bag]:
-    """Open a recording of ROS 1 (.bag) or ROS 2 (its folder, or one .db3 or .mcap file).
+    """Open a ROS 1 bag (.bag) or a ROS 2 bag (its folder, or one .db3 or .mcap file).
 
     Raises:
         MissingExtraError: the package rosbags is not installed.
-        CloudReadError: no bag, or a damaged one.
+        CloudReadError: no bag, or damaged.
     """
     try:
         from rosbags.rosbag1 import Reader as Reader1
@@ -71,16 +72,20 @@ def open_bag(path: Path) -> Iterator[Bag]:
     except ImportError as error:
         raise missing_extra("a ROS bag", "rosbags") from error
     if not path.exists():
-        raise CloudReadError(f"{path}: no such file or folder")
+        raise CloudReadError("no such file or folder", path=path)
     if path.is_dir() and not (path / "metadata.yaml").is_file():
-        raise CloudReadError(f"{path.name}: has no metadata.yaml, so is no ROS 2 bag: give the file inside")
-    if path.is_file() and path.suffix not in (".bag", ".db3", ".mcap"):
-        raise CloudReadError(f"{path.name}: no bag: give a .bag, .db3 or .mcap file, or a ROS 2 bag folder")
+        raise CloudReadError(
+            "has no metadata.yaml, so it is no ROS 2 bag", path=path, hint="open the file inside"
+        )
+    if path.is_file() and path.suffix not in BAG_SUFFIXES:
+        raise CloudReadError(
+            "is no bag", path=path, expected=f"a file {' '.join(BAG_SUFFIXES)}, or a ROS 2 bag folder"
+        )
     is_ros1 = path.is_file() and path.suffix == ".bag"
     types = get_typestore(Stores.ROS1_NOETIC if is_ros1 else Stores.LATEST)
     limit_unpacking()
     with ExitStack() as stack:
-        with _one_line(path, "damaged, or no bag"), limited_sqlite():
+        with _wrap_errors(path, "damaged, or no bag"), limited_sqlite():
             if path.is_dir():
                 check_metadata(path)
             reader = Reader1(path) if is_ros1 else Reader2(path)
@@ -93,48 +98,44 @@ def open_bag(path: Path) -> Iterator[Bag]:
 
 
 class Bag:
-    """An open recording; `open_bag` makes it."""
+    """Open bag, returned by `open_bag`."""
 
     def __init__(self, path: Path, reader: Any, deserialize: Callable[[bytes, str], Any]) -> None:
         self._path = path
         self._reader = reader
         self._deserialize = deserialize
-        found: dict[str, BagTopic] = {}
+        topics: dict[str, BagTopic] = {}
         for connection in reader.connections:
             name, message_type = connection.topic, connection.msgtype
-            if isinstance(name, str) and isinstance(message_type, str):  # SQLite and YAML hold what they like
-                known = found.get(name, BagTopic(name, message_type, 0))
-                found[name] = known._replace(messages=known.messages + int(connection.msgcount))
-        self._topics = [found[name] for name in sorted(found)]
+            # SQLite and YAML may hold other types.
+            if isinstance(name, str) and isinstance(message_type, str):
+                topic = topics.get(name, BagTopic(name, message_type, 0))
+                topics[name] = topic._replace(messages=topic.messages + int(connection.msgcount))
+        self._topics = topics
 
     @property
     def topics(self) -> list[BagTopic]:
-        """Every topic, sorted by name."""
-        return self._topics
+        """All topics, sorted by name."""
+        return [self._topics[name] for name in sorted(self._topics)]
 
     def choose(self, name: str | None = None) -> BagTopic:
-        """The topic of this name, or the only one that can be read.
+        """Return the topic of this name, or the only one that can be read.
 
         Raises:
-            CloudReadError: there is none such, or more than one; the error lists those that can be read.
+            CloudReadError: there is no such topic, or more than one; the error lists the readable ones.
         """
-        if name is not None:
-            complaint = self._complaint(name)
-            if not complaint:
-                return next(topic for topic in self.topics if topic.name == name)
-        usable = [topic for topic in self.topics if not self._complaint(topic.name)]
-        listed = ", ".join(f"{topic.name} ({_short(topic.type)}, {topic.messages})" for topic in usable)
-        if name is not None:
-            raise CloudReadError(
-                f"{self._path.name}: topic {name} {complaint}; usable are: {listed or 'none'}"
-            )
-        if not usable:
-            raise CloudReadError(
-                f"{self._path.name}: none of its {len(self.topics)} topics holds clouds or depth images"
-            )
-        if len(usable) > 1:
-            raise CloudReadError(f"{self._path.name}: say by --topic which to read: {listed}")
-        return usable[0]
+        problem = "" if name is None else self._problem(name)
+        if name is not None and not problem:
+            return self._topics[name]
+        readable = [topic for topic in self.topics if not self._problem(topic.name)]
+        if name is None and len(readable) == 1:
+            return readable[0]
+        if name is None and readable:
+            problem = f"{len(readable)} topics can be read, and none was chosen"
+        elif name is None:
+            problem = f"none of the {len(self.topics)} topics holds clouds or depth images"
+        listed = ", ".join(f"{topic.name} ({_short(topic.type)}, {topic.messages})" for topic in readable)
+        raise CloudReadError(problem, path=self._path, field="topic", expected=listed or None)
 
     def clouds(
         self,
@@ -146,30 +147,29 @@ class Bag:
         """Read the clouds of a topic in the order of recording.
 
         Args:
-            topic: of `choose`.
-            options: as of cloud files and depth images; the frame is that of the clouds.
-            camera_info_topic: camera of depth images. If not given it is that of the options, or else that of the
+            topic: a topic returned by `choose`.
+            options: frame, units and camera.
+            camera_info_topic: topic with the camera of depth images; None takes the camera of the options, or the
                 topic `camera_info` beside the images.
-            every: read every first, second, ... message only.
+            every: read one of this number of messages.
 
         Raises:
             CameraError: depth images without a camera.
-            CloudReadError: the bag is damaged from here on; a single unreadable message is a `StampedCloud` and no
-                reason to stop.
+            CloudReadError: the bag is damaged from here on. A single damaged message is yielded with its error.
         """
         convert = self._converter(topic, options, camera_info_topic)
         for log_ns, raw in islice(self._raw_messages(topic.name), 0, None, every):
             yield self._stamped(log_ns, raw, topic.type, convert)
 
-    def _complaint(self, name: str) -> str:
-        """Why a topic cannot be read, or nothing; what images hold is only told by the first of them."""
-        topic = next((topic for topic in self.topics if topic.name == name), None)
+    def _problem(self, name: str) -> str:
+        """Return why a topic cannot be read, or an empty string; the encoding of images is that of the first."""
+        topic = self._topics.get(name)
         if topic is None:
-            return "is not in this bag"
+            return f"no topic {name}"
         if topic.messages == 0:
-            return "holds no messages"
+            return f"{name} holds no messages"
         if topic.type not in (CLOUD, IMAGE, COMPRESSED_IMAGE):
-            return f"holds {_short(topic.type)} messages"
+            return f"{name} holds {_short(topic.type)} messages"
         if topic.type != CLOUD:
             try:
                 message = self._first(topic)
@@ -178,18 +178,18 @@ class Bag:
                 else:
                     check_compressed_format(message.format)
             except CloudReadError as error:
-                return str(error)
+                return f"{name} {error.describe(with_path=False)}"
         return ""
 
     def _raw_messages(self, name: str) -> Iterator[tuple[int, bytes]]:
         connections = [connection for connection in self._reader.connections if connection.topic == name]
-        with _one_line(self._path, "damaged from here on"):
+        with _wrap_errors(self._path, "damaged from here on"):
             for _, log_ns, raw in self._reader.messages(connections):
                 yield int(log_ns), raw
 
     def _first(self, topic: BagTopic) -> Any:
         _, raw = next(self._raw_messages(topic.name), (0, b""))
-        with _one_line(self._path, f"damaged message of {topic.name}"):
+        with _wrap_errors(self._path, f"damaged message of {topic.name}"):
             return self._message(raw, topic.type)
 
     def _message(self, raw: bytes, message_type: str) -> Any:
@@ -207,7 +207,7 @@ class Bag:
             cloud = convert(message)
         except DoorstateError as error:
             cloud = error
-        except Exception as error:  # whatever rosbags and Pillow make of foreign bytes
+        except Exception as error:  # on damaged bytes rosbags and Pillow raise exceptions of any type
             cloud = CloudReadError(f"damaged message ({summarize_exception(error)})")
         return StampedCloud(stamp_ns / 1e9, frame_id, cloud)
 
@@ -220,19 +220,19 @@ class Bag:
         return lambda message: points_from_message(message, topic.type, options)
 
     def _camera(self, name: str) -> Intrinsics:
-        topic = next(
-            (topic for topic in self.topics if (topic.name, topic.type) == (name, CAMERA_INFO)), None
-        )
-        if topic is None or topic.messages == 0:
+        topic = self._topics.get(name)
+        if topic is None or topic.type != CAMERA_INFO or topic.messages == 0:
             raise CameraError(
-                f"{self._path.name}: no CameraInfo in {name}, which depth images need: "
-                "give --camera-info-topic, --intrinsics FILE or --fx --fy --cx --cy"
+                f"depth images need a camera, and there is no CameraInfo in {name}",
+                path=self._path,
+                field="camera_info_topic",
+                hint="or give the intrinsics",
             )
         info = self._first(topic)
         try:
             return intrinsics_from_message(info)
         except CameraError as error:
-            raise CameraError(f"{self._path.name}: {name}: {error}") from error
+            raise CameraError(f"{name}: {error}", path=self._path) from error
 
 
 def _camera_info_beside(topic: str) -> str:
@@ -244,11 +244,11 @@ def _short(message_type: str) -> str:
 
 
 @contextmanager
-def _one_line(path: Path, complaint: str) -> Iterator[None]:
-    """Foreign bytes make rosbags raise anything; to the user it is one thing."""
+def _wrap_errors(path: Path, problem: str) -> Iterator[None]:
+    """Turn exceptions of any type, as rosbags raises on damaged bytes, into CloudReadError."""
     try:
         yield
     except DoorstateError:
         raise
     except Exception as error:
-        raise CloudReadError(f"{path.name}: {complaint} ({summarize_exception(error)})") from error
+        raise CloudReadError(f"{problem} ({summarize_exception(error)})", path=path) from error

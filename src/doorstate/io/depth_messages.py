@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The fields of the ROS messages that hold depth images, read as pixels; needs no ROS."""
+"""Depth images of ROS messages (Image, CompressedImage), read as pixels without ROS."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from doorstate.io.pointcloud2 import MessageBytes
 from doorstate.io.size_limits import check_point_count, check_size
 
 DEPTH_ENCODINGS = {"16UC1": "u2", "mono16": "u2", "32FC1": "f4"}
-# compressed_depth_image_transport, compression_common.h: the format, and the two parameters of inverse depth.
+# compressed_depth_image_transport, compression_common.h: format, and the two parameters of inverse depth.
 _PARAMETERS = struct.Struct("<iff")
 
 
@@ -35,7 +35,7 @@ def pixels_from_image(
         (height, width) uint16 (millimetres by ROS REP 118) or float32 (metres), as stored.
 
     Raises:
-        CloudReadError: when it is another image, or contradicts itself.
+        CloudReadError: another kind of image, or fields that contradict each other.
     """
     check_encoding(encoding)
     dtype = np.dtype(DEPTH_ENCODINGS[encoding]).newbyteorder(">" if is_bigendian else "<")
@@ -49,17 +49,17 @@ def pixels_from_image(
 
 
 def pixels_from_compressed_depth(image_format: str, data: MessageBytes) -> NDArray[Any]:
-    """Read a sensor_msgs/CompressedImage of the image transport `compressedDepth` that holds a PNG.
+    """Read a sensor_msgs/CompressedImage of the image transport `compressedDepth`, as PNG.
 
     Args:
         image_format: such as `16UC1; compressedDepth png`.
         data: twelve bytes of parameters, then the PNG.
 
     Returns:
-        (H, W) as of `pixels_from_image`; of 32FC1 the PNG holds inverse depth, NaN where it is 0.
+        (H, W) like `pixels_from_image`; for 32FC1 the PNG holds inverse depth, NaN where it is 0.
 
     Raises:
-        CloudReadError: when it is another image, compressed in another way, or damaged.
+        CloudReadError: another kind of image or compression, or damaged.
     """
     check_compressed_format(image_format)
     content = bytes(data)
@@ -73,19 +73,27 @@ def pixels_from_compressed_depth(image_format: str, data: MessageBytes) -> NDArr
 
 
 def check_encoding(encoding: str) -> None:
-    """Raise CloudReadError unless images of this encoding are depth images."""
+    """Check that images of this encoding are depth images.
+
+    Raises:
+        CloudReadError: they are not.
+    """
     if encoding not in DEPTH_ENCODINGS:
         raise CloudReadError(
-            f"is an image in {encoding or 'no encoding'}, not depth ({', '.join(DEPTH_ENCODINGS)})"
+            f"is an image in {encoding or 'no encoding'}, not depth", expected=", ".join(DEPTH_ENCODINGS)
         )
 
 
 def check_compressed_format(image_format: str) -> None:
-    """Raise CloudReadError unless compressed images of this format are depth images that can be read."""
+    """Check that compressed images of this format are depth images that can be read.
+
+    Raises:
+        CloudReadError: they are not.
+    """
     if "compressedDepth" not in image_format:
         raise CloudReadError(f"is an image compressed as {image_format!r}, not compressedDepth")
     if "rvl" in image_format:
-        raise CloudReadError(f"is compressed as {image_format!r}: only PNG can be read")
+        raise CloudReadError(f"is compressed as {image_format!r}", expected="PNG")
     check_encoding(_encoding(image_format))
 
 

@@ -1,18 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""ROS messages that hold clouds or depth images, from a bag or a live topic, read as points; needs no ROS."""
+"""Clouds and depth images of ROS messages, from a bag or a live topic, read as points without ROS."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any
 
+from doorstate.io.body_frame import points_from_depth, points_in_body
 from doorstate.io.camera import Intrinsics
 from doorstate.io.depth_messages import pixels_from_compressed_depth, pixels_from_image
+from doorstate.io.options import ReadOptions
 from doorstate.io.pointcloud2 import points_from_pointcloud2
-from doorstate.io.readers import ReadOptions, points_from_depth, points_in_body
 from doorstate.types import Points
 
-# Message types by the names that ROS 2 gives them; rosbags names those of ROS 1 alike.
+# Message types by their ROS 2 names; rosbags uses the same names for ROS 1.
 CLOUD = "sensor_msgs/msg/PointCloud2"
 IMAGE = "sensor_msgs/msg/Image"
 COMPRESSED_IMAGE = "sensor_msgs/msg/CompressedImage"
@@ -25,20 +26,20 @@ def points_from_message(message: Any, message_type: str, options: ReadOptions) -
     Args:
         message: has the fields of its type.
         message_type: CLOUD, IMAGE or COMPRESSED_IMAGE.
-        options: as of cloud files and depth images; images need a camera.
+        options: frame, units and camera; images need a camera.
 
     Returns:
         (H, W, 3) or (N, 3) metres, x forward, y left, z up, NaN where nothing was measured.
 
     Raises:
-        CloudReadError: another image than depth, or a message that contradicts itself.
+        CloudReadError: an image without depth, or fields that contradict each other.
         CameraError: an image without a camera, or with one of another size.
     """
     return _READERS[message_type](message, options)
 
 
 def intrinsics_from_message(info: Any) -> Intrinsics:
-    """Camera of rectified images of a CameraInfo, as ROS' own depth_image_proc takes it: P, or K where P is not set.
+    """Return the camera of a CameraInfo for rectified images: P, or K where P is not set, as depth_image_proc does.
 
     Raises:
         CameraError: the camera was not calibrated.
@@ -49,13 +50,13 @@ def intrinsics_from_message(info: Any) -> Intrinsics:
 
 
 def stamp_ns_of(message: Any) -> int:
-    """When a message with a header was taken, in nanoseconds; 0 where its driver does not say."""
+    """Return the header stamp of a message in nanoseconds; 0 if its driver does not set one."""
     stamp = message.header.stamp
     return int(stamp.sec) * 10**9 + int(stamp.nanosec)
 
 
 def is_optical(frame_id: str) -> bool:
-    """Whether a frame is, by its name (REP 103), x right, y down, z forward."""
+    """Return True if the name of a frame is that of an optical frame (REP 103): x right, y down, z forward."""
     return "optical" in frame_id
 
 

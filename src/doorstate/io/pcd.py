@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Point Cloud Library files (.pcd): ASCII, binary and compressed.
 
-The header is read and checked here, against the size of the file, and handed to pypcd4 in the one form it
-takes: left alone it stops at headers of PCD 0.5 and 0.6 or without COUNT, and believes any declared size.
-ASCII rows are read like every other table, since pypcd4 stops at doubled or trailing blanks. The VIEWPOINT
-entry is not applied: points are taken in the coordinates they are stored in.
+The header is parsed and checked against the file size here, and passed to pypcd4 in a normal form: pypcd4 itself
+rejects headers of PCD 0.5 and 0.6 or without COUNT, and trusts any declared size. ASCII rows are read like other
+tables, because pypcd4 rejects doubled or trailing blanks. VIEWPOINT is not applied: points stay in the coordinates
+they are stored in.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _DATA_LINE = re.compile(rb"^DATA[ \t]+(ascii|binary|binary_compressed)[ \t]*(?:\
 _COMPRESSED_SIZES = struct.Struct("<II")
 # LZF's longest back reference turns 3 bytes into 264.
 _MAX_EXPANSION = 88
-# pypcd4 makes a field of every value. The longest features of a point are SHOT's 352 and its colours' 1344.
+# pypcd4 makes a field for every value. The longest features of a point are SHOT's 352 and its colours' 1344.
 _MAX_POINT_VALUES = 4096
 
 
@@ -41,11 +41,13 @@ def parse_pcd(data: bytes) -> NDArray[Any]:
         (N, 3), or (H, W, 3) of an organized file, in file order and units, NaN kept.
 
     Raises:
-        CloudReadError: when the header lacks x, y, z or contradicts itself, or points are missing.
+        CloudReadError: the header lacks x, y, z or contradicts itself, or points are missing.
     """
     header_end = _DATA_LINE.search(data)
     if header_end is None:
-        raise CloudReadError("is no PCD file: the header has no line DATA ascii, binary or binary_compressed")
+        raise CloudReadError(
+            "is no PCD file", expected="a header with DATA ascii, binary or binary_compressed"
+        )
     encoding = Encoding(header_end[1].decode())
     metadata, shape = _read_header(data[: header_end.start()].decode("ascii", errors="replace"), encoding)
     return _parse_rows(metadata, data[header_end.end() :]).reshape(shape)
@@ -61,7 +63,7 @@ def _parse_rows(metadata: MetaData, body: bytes) -> NDArray[Any]:
         return parse_rows(body, columns, metadata.points)
     if sum(metadata.count) > _MAX_POINT_VALUES:
         raise CloudReadError(
-            f"has {sum(metadata.count)} values a point: at most {_MAX_POINT_VALUES} can be read"
+            f"has {sum(metadata.count)} values per point", expected=f"at most {_MAX_POINT_VALUES}"
         )
     point_bytes = sum(size * count for size, count in zip(metadata.size, metadata.count, strict=True))
     declared = metadata.points * point_bytes
@@ -85,10 +87,10 @@ def write_pcd(path: Path, points: Points) -> None:
         points: (N, 3), or (H, W, 3) for an organized cloud of WIDTH W and HEIGHT H; float32 metres.
 
     Raises:
-        CloudContentError: when the array has another shape.
+        CloudContentError: the array has another shape.
     """
     if points.ndim not in (2, 3) or points.shape[-1] != 3:
-        raise CloudContentError(f"{path.name}: points of shape {points.shape} are not (N, 3) or (H, W, 3)")
+        raise CloudContentError(f"points of shape {points.shape}", path=path, expected="(N, 3) or (H, W, 3)")
     cloud = PointCloud.from_xyz_points(points.reshape(-1, 3))  # (H * W, 3)
     cloud.metadata.height, cloud.metadata.width = points.shape[:2] if points.ndim == 3 else (1, len(points))
     with atomic_path(path) as temporary:
@@ -96,18 +98,18 @@ def write_pcd(path: Path, points: Points) -> None:
 
 
 def _read_header(text: str, encoding: Encoding) -> tuple[MetaData, tuple[int, ...]]:
-    """What pypcd4 needs to know, and the shape of the points."""
+    """Return the header for pypcd4, and the shape of the points."""
     entries = {words[0]: words[1:] for line in text.splitlines() if (words := line.split("#")[0].split())}
     fields = entries.get("FIELDS", [])
     if not {"x", "y", "z"} <= set(fields):
-        raise CloudReadError(f"has the fields {' '.join(fields) or 'none'}: x, y and z are needed")
+        raise CloudReadError(f"has the fields {' '.join(fields) or 'none'}", expected="x, y and z")
     sizes, types = entries.get("SIZE", []), entries.get("TYPE", [])
     counts = entries.get("COUNT", ["1"] * len(fields))
     if not len(fields) == len(sizes) == len(types) == len(counts):
-        raise CloudReadError("has a header whose FIELDS, SIZE, TYPE and COUNT differ in length")
+        raise CloudReadError("FIELDS, SIZE, TYPE and COUNT of the header differ in length")
     extent = entries.get("POINTS") or entries.get("WIDTH", []) + entries.get("HEIGHT", ["1"])
     points = math.prod(int(number) for number in extent)
-    # pypcd4 wants every name once: fields other than x, y, z (padding, repeated names) go by their place.
+    # pypcd4 needs unique names: fields other than x, y, z (padding, repeated names) are named by their place.
     firsts = {fields.index(axis) for axis in "xyz"}
     height, width = (int(entries.get(name, ["1"])[0]) for name in ("HEIGHT", "WIDTH"))
     shape = (height, width, 3) if min(height, width) > 1 and height * width == points else (points, 3)

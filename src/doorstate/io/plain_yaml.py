@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""YAML as recorders and calibrations write it: a few lines with aliases may stand for gigabytes, and are refused."""
+"""YAML without aliases: a few lines with aliases can expand to gigabytes."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ class _PlainLoader(yaml.SafeLoader):
 
 
 def plain_documents(text: str) -> Iterator[Any]:
-    """Documents of a YAML stream, each read when it is asked for.
+    """Iterate over the documents of a YAML stream.
 
     Raises:
-        yaml.YAMLError: no YAML, or one with aliases.
+        yaml.YAMLError: no YAML, or an alias.
     """
-    found: Iterator[Any] = yaml.load_all(text, Loader=_PlainLoader)
-    return found
+    documents: Iterator[Any] = yaml.load_all(text, Loader=_PlainLoader)
+    return documents

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The vertices of PLY files: ASCII and binary of both byte orders, with whatever else the file holds.
+"""Vertices of PLY files, ASCII and binary in both byte orders.
 
-Own reader, because trimesh (5.2) accepts an ASCII file with fewer vertices than its header declares, refuses
-binary files with mixed polygons or a trailing newline, and opens a picture that a comment names.
+Own reader, because trimesh (5.2) accepts ASCII files with fewer vertices than declared, rejects binary files with
+mixed polygons or a trailing newline, and opens image files that a comment names.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from doorstate.io.text import parse_rows
 
 _HEADER = re.compile(rb"\Aply\s.*?^end_header[ \t]*(?:\r\n|\n|\r|\Z)", re.DOTALL | re.MULTILINE)
 _BYTE_ORDERS = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}
-# The names of Turk's first description (1994), then the sized names other writers use.
+# Names of Turk's description (1994), then the sized names of other writers.
 _TYPES = {
     "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4",
     "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4",
@@ -35,27 +35,27 @@ class _Element:
     properties: list[tuple[str, str]] = field(default_factory=list)  # (name, type)
 
     def record(self, byte_order: str) -> np.dtype[np.void]:
-        """Layout of one element in a binary file."""
+        """Return the layout of one element in a binary file."""
         for name, kind in self.properties:
             if kind not in _TYPES:
                 raise CloudReadError(
-                    f"has {kind} values ({self.name} {name}) in or before its vertices: leave them out"
+                    f"has {kind} values ({self.name} {name}) in or before its vertices", expected="numbers"
                 )
         return np.dtype([(name, byte_order + _TYPES[kind]) for name, kind in self.properties])
 
 
 def parse_ply(data: bytes) -> NDArray[Any]:
-    """Read x, y, z of the element `vertex`; its other properties and the other elements are passed over.
+    """Read x, y, z of the element `vertex`; other properties and elements are skipped.
 
     Returns:
         (N, 3) in file order and units, NaN kept.
 
     Raises:
-        CloudReadError: when there are no such vertices, or fewer than the header declares.
+        CloudReadError: there are no such vertices, or fewer than the header declares.
     """
     header = _HEADER.match(data)
     if header is None:
-        raise CloudReadError("is no PLY file: it does not start with a header from ply to end_header")
+        raise CloudReadError("is no PLY file", expected="a header from ply to end_header")
     byte_order, elements = _read_header(header[0].decode("ascii", errors="replace"))
     place = next((place for place, element in enumerate(elements) if element.name == "vertex"), None)
     if place is None:
@@ -63,7 +63,7 @@ def parse_ply(data: bytes) -> NDArray[Any]:
     before, vertex = elements[:place], elements[place]
     names = [name for name, _ in vertex.properties]
     if not {"x", "y", "z"} <= set(names):
-        raise CloudReadError(f"has vertices of {', '.join(names) or 'nothing'}: x, y and z are needed")
+        raise CloudReadError(f"has vertices of {', '.join(names) or 'nothing'}", expected="x, y and z")
     record = vertex.record(byte_order)
     body = data[header.end() :]
     if byte_order == _BYTE_ORDERS["ascii"]:
@@ -89,5 +89,5 @@ def _read_header(text: str) -> tuple[str, list[_Element]]:
             case ["property", kind, name] if elements:
                 elements[-1].properties.append((name, kind))
     if byte_order is None:
-        raise CloudReadError("has no line format ascii, binary_little_endian or binary_big_endian")
+        raise CloudReadError("has no line format", expected=" or ".join(_BYTE_ORDERS))
     return byte_order, elements

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Depth images stored as grey PNG: 16 bit, and 8 bit where a data set says what its steps mean."""
+"""Depth images as grey PNG: 16 bit, and 8 bit for data sets that define their depth steps."""
 
 from __future__ import annotations
 
@@ -28,15 +28,17 @@ def parse_depth_png(data: bytes) -> NDArray[np.uint16]:
         (H, W) as stored.
 
     Raises:
-        CloudReadError: when it is no PNG, a colour or 8-bit image, or damaged.
+        CloudReadError: no PNG, a colour or 8-bit image, or damaged.
     """
     bits, colour_type = _check(data)
     if colour_type != 0:
-        raise CloudReadError("is a colour image, not a depth image: give the 16-bit depth image beside it")
+        raise CloudReadError("is a colour image", expected="a grey depth image with 16 bit")
     if bits != 16:
-        raise CloudReadError(f"{bits}-bit image, {2**bits} depth steps: not a depth image in 16 bit")
+        raise CloudReadError(
+            f"is an image with {bits} bit, {2**bits} depth steps", expected="a grey depth image with 16 bit"
+        )
     pixels = _pixels(data)
-    if pixels.ndim != 2 or pixels.dtype.itemsize < 2:  # Pillow believes the last of several headers
+    if pixels.ndim != 2 or pixels.dtype.itemsize < 2:  # Pillow takes the last of several headers
         raise CloudReadError("is a damaged PNG image: it has two headers")
     return pixels.astype(np.uint16)
 
@@ -48,23 +50,23 @@ def parse_coarse_png(data: bytes) -> NDArray[np.uint8]:
         (H, W) as stored.
 
     Raises:
-        CloudReadError: when it is no PNG, has colours or another number of bits, or is damaged.
+        CloudReadError: no PNG, colours or another number of bits, or damaged.
     """
     bits, colour_type = _check(data)
     if bits != 8:
-        raise CloudReadError(f"{bits}-bit image: the depth images of this data set have 8 bit")
+        raise CloudReadError(f"is an image with {bits} bit", expected="8 bit, as in this data set")
     if colour_type not in (0, 2):
         raise CloudReadError("is no grey image")
     pixels = _pixels(data).astype(np.uint8)
     if pixels.ndim == 3:
         if (pixels != pixels[..., :1]).any():
-            raise CloudReadError("is a colour image, not a depth image")
+            raise CloudReadError("is a colour image", expected="a grey depth image")
         pixels = pixels[..., 0]
     return pixels
 
 
 def _check(data: bytes) -> tuple[int, int]:
-    """Bits a channel and colour type of a PNG whose declared size is possible."""
+    """Return bits per channel and colour type of a PNG, after checking its declared size."""
     if len(data) < _HEADER.size:
         raise CloudReadError("is no PNG image")
     signature, chunk, width, height, bits, colour_type = _HEADER.unpack_from(data)
@@ -82,5 +84,5 @@ def _pixels(data: bytes) -> NDArray[Any]:
     try:
         with Image.open(io.BytesIO(data), formats=["PNG"]) as image:
             return np.asarray(image)
-    except Exception as error:  # Pillow raises anything on damaged bytes
+    except Exception as error:  # on damaged bytes Pillow raises exceptions of any type
         raise CloudReadError(f"is a damaged PNG image ({type(error).__name__}: {error})") from error

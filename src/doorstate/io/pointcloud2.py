@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The fields of a ROS message sensor_msgs/PointCloud2, read as points; needs no ROS."""
+"""ROS message sensor_msgs/PointCloud2, read as points without ROS."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from doorstate.types import Points
 _FLOATS = {7: "f4", 8: "f8"}
 
 
-# How rospy, rclpy and rosbags hold uint8[].
+# Types of uint8[] in rospy, rclpy and rosbags.
 MessageBytes: TypeAlias = "bytes | array[int] | NDArray[np.uint8]"
 
 
 class PointField(Protocol):
-    """What sensor_msgs/PointField says of one value of a point."""
+    """Interface of sensor_msgs/PointField: one value of a point."""
 
     @property
     def name(self) -> str: ...
@@ -44,11 +44,11 @@ def points_from_pointcloud2(
     row_step: int,
     data: MessageBytes,
 ) -> Points:
-    """Read x, y and z of every point, whatever lies between them.
+    """Read x, y and z of every point; other fields and padding are skipped.
 
     Args:
         height, width: rows and columns; unorganized clouds have one row.
-        fields: where in a point each value is.
+        fields: places of the values within a point.
         is_bigendian: byte order of the values.
         point_step: bytes from a point to the next.
         row_step: bytes from a row to the next.
@@ -59,7 +59,7 @@ def points_from_pointcloud2(
         where there is one row, (0, 3) where there is no point.
 
     Raises:
-        CloudReadError: when x, y or z is missing or no float, or the message contradicts itself.
+        CloudReadError: x, y or z is missing or no float, or the message contradicts itself.
     """
     if min(height, width, point_step, row_step) < 0:
         raise CloudReadError(
@@ -70,8 +70,8 @@ def points_from_pointcloud2(
         return np.empty((0, 3), np.float32)
     places = [_place(axis, fields, point_step) for axis in "xyz"]
     content = np.frombuffer(data, np.uint8)
-    # Drivers leave 0 or an old row_step behind (ros-drivers/velodyne#279, realsense-ros#1668): points that fill
-    # the data to the last byte have rows without padding, whatever is declared.
+    # Some drivers publish a wrong row_step (ros-drivers/velodyne#279, realsense-ros#1668): points that fill the
+    # data to the last byte have rows without padding.
     if len(content) == height * width * point_step:
         row_step = width * point_step
     if width * point_step > row_step:
@@ -80,7 +80,7 @@ def points_from_pointcloud2(
         )
     check_size(height * row_step, len(content), "bytes")
     points = np.empty((height, width, 3), np.float32)
-    # What a double holds beyond float32 is as good as infinite: no return.
+    # Overflow from float64 gives infinity, which is "not measured".
     with np.errstate(over="ignore", invalid="ignore"):
         for axis, (offset, stored) in enumerate(places):
             dtype = np.dtype(stored).newbyteorder(">" if is_bigendian else "<")
@@ -92,10 +92,11 @@ def _place(axis: str, fields: Sequence[PointField], point_step: int) -> tuple[in
     field = next((field for field in fields if field.name == axis), None)
     if field is None:
         names = " ".join(field.name for field in fields) or "none"
-        raise CloudReadError(f"has the fields {names}: x, y and z are needed")
+        raise CloudReadError(f"has the fields {names}", expected="x, y and z")
     if field.datatype not in _FLOATS or field.count != 1:
         raise CloudReadError(
-            f"has {field.count} of datatype {field.datatype} as {axis}: one float32 (7) or float64 (8) is needed"
+            f"has {field.count} values of datatype {field.datatype} as {axis}",
+            expected="one float32 (7) or float64 (8)",
         )
     stored = _FLOATS[field.datatype]
     if not 0 <= field.offset <= point_step - np.dtype(stored).itemsize:

@@ -1,16 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A header may declare no more than its file holds: checked before anything of that size is allocated."""
+"""Checks of declared sizes, before anything of that size is allocated."""
 
 from __future__ import annotations
 
 from doorstate.errors import CloudReadError
 
-# The largest depth cameras have 8 megapixels. A file may pack far more into a few bytes.
+# The largest depth cameras have 8 megapixels. A small file can unpack to far more.
 MAX_POINTS = 1 << 23
 
 
 def check_size(declared: int, present: int, unit: str) -> None:
-    """Raise CloudReadError when a negative number of units is declared, or more than is present."""
+    """Check that a declared number is not negative and not more than is present.
+
+    Raises:
+        CloudReadError: it is.
+    """
     if declared < 0:
         raise CloudReadError(f"is damaged: {declared} {unit} are declared")
     if declared > present:
@@ -18,6 +22,10 @@ def check_size(declared: int, present: int, unit: str) -> None:
 
 
 def check_point_count(count: int) -> None:
-    """Raise CloudReadError when there are more points or pixels than a depth camera has."""
+    """Check that a depth camera can have this number of points or pixels.
+
+    Raises:
+        CloudReadError: there are more.
+    """
     if count > MAX_POINTS:
-        raise CloudReadError(f"holds {count} points: not one camera frame (at most {MAX_POINTS})")
+        raise CloudReadError(f"holds {count} points: not one camera frame", expected=f"at most {MAX_POINTS}")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Points as rows of text: .xyz, .txt and .csv files, and the bodies of ASCII PCD and PLY."""
+"""Points as rows of text: .xyz, .txt and .csv files, and the bodies of ASCII PCD and PLY files."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _EMPTY_CELL = re.compile(r"([,;\n])[ \t]*(?=[,;\n])")
 
 
 def parse_table(data: bytes) -> NDArray[np.float64]:
-    """Read a text table whose columns are split by commas, semicolons or blanks.
+    """Read a text table with columns separated by commas, semicolons or blanks.
 
     The points are columns x, y, z of the header, in any order, or without a header the first three columns.
     The header may be a comment (`# x,y,z` by numpy.savetxt, `//X Y Z` by CloudCompare) if it names every
@@ -27,7 +27,7 @@ def parse_table(data: bytes) -> NDArray[np.float64]:
         (N, 3) in file order and units.
 
     Raises:
-        CloudReadError: when the text is neither numbers nor a header with x, y, z, or a row breaks off.
+        CloudReadError: the text is neither numbers nor a header with x, y, z, or a row breaks off.
     """
     lines = [line.strip() for line in data.decode("utf-8-sig").splitlines()]
     header: list[str] = []
@@ -38,7 +38,7 @@ def parse_table(data: bytes) -> NDArray[np.float64]:
         if {"x", "y", "z"} <= set(cells):
             header, header_is_comment = cells, is_comment
         elif line and not is_comment:
-            # A comment that merely mentions x, y and z is prose, not a header.
+            # A comment that mentions x, y and z among other words is no header.
             named = header and (len(header) == len(cells) or not header_is_comment)
             columns = [header.index(axis) for axis in "xyz"] if named else range(3)
             delimiter = next((mark for mark in ";," if mark in line.split("#")[0]), None)
@@ -63,7 +63,7 @@ def parse_rows(body: bytes, columns: Sequence[int], count: int, skip: int = 0) -
         (count, 3) in file order and units.
 
     Raises:
-        CloudReadError: when there are fewer rows, or one is not numbers.
+        CloudReadError: there are fewer rows, or one is not numbers.
     """
     rows = [row for row in body.decode("utf-8", errors="replace").splitlines() if row.strip()]
     points = _load(rows[skip : skip + count], columns, None)
@@ -78,4 +78,4 @@ def _load(rows: Sequence[str], columns: Sequence[int], delimiter: str | None) ->
     try:
         return np.loadtxt(rows, dtype=np.float64, delimiter=delimiter, usecols=tuple(columns), ndmin=2)
     except ValueError as error:
-        raise CloudReadError(f"expected rows of numbers, or a header naming x, y, z: {error}") from error
+        raise CloudReadError(f"{error}", expected="rows of numbers, or a header naming x, y, z") from error

@@ -8,8 +8,11 @@ from pathlib import PurePath
 from fastapi import HTTPException
 from pydantic import BaseModel, ConfigDict, Field
 
+from doorstate.io.camera import pinhole_from_numbers
 from doorstate.io.depth import ROLLS_DEG
-from doorstate.io.readers import CLOUD_SUFFIXES, UNITS_M, ReadOptions, options_from_flags
+from doorstate.io.options import ReadOptions, metres_per_unit
+from doorstate.io.readers import CLOUD_SUFFIXES
+from doorstate.types import UNITS_M
 
 _FORMATS = [suffix.lstrip(".") for suffix in CLOUD_SUFFIXES]
 _FORMAT_OF_SUBTYPE = {"plain": "txt"}  # media subtypes that differ from the suffix
@@ -56,8 +59,9 @@ class PredictQuery(BaseModel):
             ConfigError: a parameter has no such value.
             CameraError: the camera is impossible.
         """
-        camera = (self.fx, self.fy, self.cx, self.cy)
-        return options_from_flags(self.frame, self.roll, self.units, self.depth_scale, None, camera)
+        camera = pinhole_from_numbers(self.fx, self.fy, self.cx, self.cy)
+        units_m = metres_per_unit(self.units)
+        return ReadOptions(self.frame, self.roll, camera, self.depth_scale, units_m)  # type: ignore[arg-type]
 
     def suffix(self, content_type: str) -> str:
         """Return the suffix of the file: from `format`, or else from `filename`, or else from the Content-Type.

@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 from doorstate._files import read_csv
 from doorstate.dataset.store import PreparedDataset, is_prepared, open_dataset
 from doorstate.errors import DatasetError, DoorstateError
-from doorstate.io.readers import DEFAULT_OPTIONS, ReadOptions, find_clouds, read_cloud
+from doorstate.io.find import find_clouds
+from doorstate.io.options import DEFAULT_OPTIONS, ReadOptions
+from doorstate.io.readers import read_cloud
 from doorstate.simulation.frames import replay
 from doorstate.simulation.manifest import unflatten
 from doorstate.simulation.run import MANIFEST, is_simulated

@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from doorstate.errors import CloudReadError
-from doorstate.io.readers import DEFAULT_OPTIONS, ReadOptions, find_clouds
+from doorstate.io.find import find_clouds
+from doorstate.io.options import DEFAULT_OPTIONS, ReadOptions
 from doorstate.viewer.named_clouds import NamedCloud, read_named_cloud
 
 if TYPE_CHECKING:
