@@ -121,7 +121,7 @@ def test_other_intrinsics_of_the_camera_as_built_replace_the_published(tmp_path:
         path, ReadOptions(intrinsics=Pinhole(2 * CAMERA.fx, 2 * CAMERA.fy, CAMERA.cx, CAMERA.cy))
     )
     np.testing.assert_allclose(longer[..., 1:], published[..., 1:] / 2, atol=1e-6)
-    with pytest.raises(CameraError, match=r"door\.png: the image has 480 x 640 pixels"):
+    with pytest.raises(CameraError, match=r"the image has 480 x 640 pixels"):
         read_deepdoors2(path, ReadOptions(intrinsics=Intrinsics(800, 600, 400, 400, 400, 300)))
 
 
@@ -135,7 +135,7 @@ def test_grey_stored_as_colour_is_read_and_colour_is_not(tmp_path: Path) -> None
     with pytest.raises(CloudReadError, match=r"photo\.png: is a colour image"):
         read_deepdoors2(tmp_path / "photo.png", ReadOptions())
     Image.fromarray(np.ones((640, 480), np.uint16)).save(tmp_path / "deep.png")
-    with pytest.raises(CloudReadError, match=r"deep\.png: 16-bit image: .* 8 bit"):
+    with pytest.raises(CloudReadError, match=r"16 bit; .* 8 bit"):
         read_deepdoors2(tmp_path / "deep.png", ReadOptions())
     with pytest.raises(CloudReadError, match=r"none\.png: cannot be read"):
         read_deepdoors2(tmp_path / "none.png", ReadOptions())

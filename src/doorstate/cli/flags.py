@@ -17,5 +17,9 @@ _FLAGS = {
 
 def format_flag(name: str, value: object = None) -> str:
     """Return a parameter as a user types it, such as `--points 128`; without a value only the flag."""
+    if name == "units_m" and isinstance(value, float):
+        from doorstate.io.options import unit_name
+
+        value = unit_name(value)
     flag = _FLAGS.get(name, f"--{name.replace('_', '-')}")
     return flag if value is None else f"{flag} {value}"

@@ -94,6 +94,6 @@ def read_deepdoors2(path: Path, options: ReadOptions) -> Points:
         depth_m = np.where(np.isin(stored, _NOT_MEASURED), np.nan, stored * STEP_M)
         return depth_to_points(depth_m, camera.turned_clockwise())
     except OSError as error:
-        raise CloudReadError(f"{path.name}: cannot be read ({error.strerror or error})") from error
+        raise CloudReadError(f"cannot be read ({error.strerror or error})", path=path) from error
     except DoorstateError as error:
-        raise type(error)(f"{path.name}: {error}") from error
+        raise error.located(path) from error

@@ -235,7 +235,7 @@ def _prepare_piece(piece: _Piece, path: Path) -> None:
             clouds.append(cloud)
             reasons.append("")
         except (CloudError, CameraError) as error:
-            reasons.append(str(error))
+            reasons.append(error.describe(with_path=False))
     write_clouds(path, asked.spec.num_points, clouds, parts, reasons)
 
 

@@ -93,7 +93,7 @@ def ask(methods: Methods, frames: Sequence[LabelledFrame], progress: Progress = 
         try:
             cloud = frame.read()
         except DoorstateError as error:
-            unreadable.append((frame, str(error)))
+            unreadable.append((frame, error.describe(with_path=False)))
         else:
             readable.append(frame)
             for name, method in methods.items():

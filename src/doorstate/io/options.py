@@ -56,6 +56,11 @@ class ReadOptions:
 DEFAULT_OPTIONS = ReadOptions()
 
 
+def unit_name(units_m: float) -> str:
+    """Return the name of a unit of `UNITS_M`, or the number itself for any other unit."""
+    return next((name for name, metres in UNITS_M.items() if metres == units_m), f"{units_m:g}")
+
+
 def metres_per_unit(name: str) -> float:
     """Return the size of a unit of `UNITS_M`.
 

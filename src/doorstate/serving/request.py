@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from doorstate.io.camera import pinhole_from_numbers
 from doorstate.io.depth import ROLLS_DEG
-from doorstate.io.options import ReadOptions, metres_per_unit
+from doorstate.io.options import ReadOptions, metres_per_unit, unit_name
 from doorstate.io.readers import CLOUD_SUFFIXES
 from doorstate.types import UNITS_M
 
@@ -85,5 +85,7 @@ class PredictQuery(BaseModel):
 
 def format_parameter(name: str, value: object = None) -> str:
     """Return a library parameter as a query parameter, such as `units=mm`; without a value only its name."""
+    if name == "units_m" and isinstance(value, float):
+        value = unit_name(value)
     name = _NAMES.get(name, name)
     return name if value is None else f"{name}={value}"
