@@ -1,39 +1,38 @@
 # SPDX-License-Identifier: Apache-2.0
-"""docs/images/view.png: what `doorstate view` shows in Chromium, coloured by what the packaged PointNet++ looked at.
+"""Picture docs/images/view.png: the page of `doorstate view`, coloured by the points that the packaged PointNet++ used.
 
-python tools/view_picture.py docs/images/view.png
+python -m paper.pictures.view DATASET docs/images/view.png
 """
 
 from __future__ import annotations
 
 import sys
-import tempfile
 from pathlib import Path
 
-from doorstate_command import REPOSITORY, doorstate
+from tests.headless_chromium import open_browser_page
 
-EVERY, SHOWN = 121, 27  # of the published samples; the number in the list
+from doorstate.inference.predictor import Predictor
+from doorstate.viewer.cloud_page import make_entry, render_cloud_page
+from doorstate.viewer.named_clouds import find_named_clouds
+
+EVERY, SELECTED = 121, 27  # every 121st sample is listed, and the 27th of these is shown
 
 
-def main(target: str) -> None:
-    """Make the page, choose a cloud and a colour, and take the picture."""
-    sys.path.insert(0, str(REPOSITORY / "tests"))
-    from headless_chromium import Browser
-
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        page = folder / "view.html"
-        doorstate(f"view results/ogurob-4096 --every {EVERY} --no-open --out {page}")
-        with Browser(folder / "profile") as browser:
-            size = {"width": 1100, "height": 700, "deviceScaleFactor": 1}
-            browser.call("Emulation.setDeviceMetricsOverride", **size, mobile=False)
-            browser.open(f"{page.as_uri()}#{SHOWN}")
-            browser.wait_until("document.querySelector('#plot canvas') !== null")
-            browser.click("[data-color=channels]")
-            before, now = b"", browser.screenshot()
-            while before != now:  # until it has been drawn
-                before, now = now, browser.screenshot()
-        Path(target).write_bytes(now)
+def main(dataset: str, target: str) -> None:
+    """Render the page of a prepared data set, and write a screenshot."""
+    predictor = Predictor.load()
+    readers = find_named_clouds([Path(dataset)])[::EVERY]
+    html = render_cloud_page(predictor, [make_entry(predictor, read()) for read in readers])
+    path = Path(target).resolve().with_suffix(".html")
+    path.write_text(html, encoding="utf-8")
+    with open_browser_page() as (page, _):
+        page.set_viewport_size({"width": 1100, "height": 700})
+        page.goto(f"{path.as_uri()}#{SELECTED}")
+        page.wait_for_selector("#plot canvas")
+        page.click("[data-color=channels]")
+        page.wait_for_timeout(2000)  # until the cloud is drawn
+        page.screenshot(path=target)
+    path.unlink()
 
 
 if __name__ == "__main__":
