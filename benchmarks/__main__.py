@@ -283,54 +283,6 @@ def service(
     )
 
 
-@app.command()
-def curves(
-    out: Out,
-    data: Annotated[Path, typer.Option(help="A prepared data set.")],
-    network: Annotated[str, typer.Option(help="Which network.")] = "pointnet",
-    points: Annotated[int, typer.Option(help="Points per cloud.", min=128)] = 512,
-    epochs: Annotated[int, typer.Option(help="Length of both trainings.", min=1)] = 8,
-    fold: Fold = 0,
-    seeds: Annotated[int, typer.Option(help="How many seeds fast is trained from.", min=1)] = 3,
-    runs: Annotated[Path, typer.Option(help="Folder of the runs, which are resumable.")] = Path("runs"),
-) -> None:
-    """Train one fold with fast and with plain layers from the same seed.
-
-    \b
-    Example:
-      python -m benchmarks curves --data data/ogurob-4096 --network dgcnn --points 256 --epochs 4 --out reports/speed
-    """
-    from benchmarks.curves import curves_table, draw_curves, train_both
-    from doorstate.clouds.augmentation import Augmentation
-    from doorstate.dataset.splits import draw_splits
-    from doorstate.dataset.store import open_dataset
-    from doorstate.training.fit import RunConfig
-    from doorstate.training.recipes import COMMON
-
-    (name,) = _names(network)
-    dataset = open_dataset(data)
-    # As the published curves were trained, whatever the common recipe has become since.
-    changes = {
-        "epochs": epochs,
-        "learning_rate": 1e-3,
-        "augmentation": Augmentation(yaw_deg=15.0, mirror=0.5, scale=(0.9, 1.1)),
-    }
-    recipe = COMMON.model_copy(update=changes)
-    config = RunConfig(
-        network=name,
-        dataset=dataset.description.source,
-        protocol="paper",
-        fold=fold,
-        num_points=points,
-        seed=0,
-        recipe=recipe,
-    )
-    rows = train_both(config, dataset, draw_splits(dataset.rows, "paper", 0)[fold], runs / "curves", seeds)
-    table, title = curves_table(rows), f"curves-{name}"
-    draw_curves(rows, out, title)
-    _finish(out, title, rows, table, points=points, epochs=epochs, fold=fold, data=str(data))
-
-
 def main() -> None:
     """Run the command line; our own exceptions become one line on standard error."""
     try:

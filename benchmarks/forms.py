@@ -15,7 +15,7 @@ from benchmarks.pyg import NETWORKS as PYG_NETWORKS
 from benchmarks.pyg import build_pyg
 from doorstate.networks import create_network
 from doorstate.networks.base import PointNetwork
-from doorstate.training.environment import bf16_is_quick, compiled
+from doorstate.training.environment import compile_if_possible, has_fast_bf16
 
 _PLAIN_FORMS = Path(__file__).resolve().parents[1] / "tests" / "networks"
 
@@ -38,7 +38,7 @@ AS_PORTS: dict[str, dict[str, Any]] = {"dgcnn": {"k": 20}}
 
 def forms_of(network: str, port: bool, pyg: bool, compiled: bool = False) -> list[Form]:
     """Forms a network is timed in, in the order in which they alternate."""
-    bf16 = bf16_is_quick()
+    bf16 = has_fast_bf16()
     best = "fast bf16" if bf16 else "fast fp32"
     forms = [Form("fast fp32", "fast")]
     forms += [Form("fast bf16", "fast", bf16=True)] if bf16 else []
@@ -65,7 +65,7 @@ def build_form(form: Form, network: str, checkout: Path | None, points: Tensor) 
     if form.kind == "plain":
         return plain_form(ours)
     if form.compiled:
-        ours.__dict__["training_loss"] = compiled(ours.training_loss)
+        ours.__dict__["training_loss"] = compile_if_possible(ours.training_loss)
     return _WithNeighbours(ours, points) if form.cached else ours
 
 

@@ -29,7 +29,7 @@ from doorstate.inference.network_predictor import NetworkPredictor
 from doorstate.inference.reference_clouds import LabelledClouds
 from doorstate.networks import create_network
 from doorstate.networks.card import WeightsCard
-from doorstate.training.fit import threads as use_threads
+from doorstate.training.run import torch_threads
 from doorstate.types import Points
 
 STAGES = ("clean", "sample", "network", "total")
@@ -57,7 +57,7 @@ def measure(
             progress(done, len(settings))
             for name in networks:
                 for runtime, predict in _predictors(name, points, count, raw, Path(folder)).items():
-                    with use_threads(count):
+                    with torch_threads(count):
                         predict(raw)
                         runs = [_stages(predict, raw) for _ in range(repeats)]
                     stages = {stage: [run[stage] for run in runs] for stage in STAGES}

@@ -21,7 +21,7 @@ from doorstate.evaluation.table import Table
 from doorstate.networks.dgcnn import DGCNN
 from doorstate.networks.kernels.ops import gather_rows
 from doorstate.networks.kernels.search import knn
-from doorstate.training.fit import threads as use_threads
+from doorstate.training.run import torch_threads
 
 K = 20
 _SEED = 0
@@ -63,7 +63,7 @@ def measure(
     rows = []
     torch.manual_seed(_SEED)
     network = DGCNN(k=K).eval()
-    with torch.inference_mode(), use_threads(threads), threadpool_limits(threads):
+    with torch.inference_mode(), torch_threads(threads), threadpool_limits(threads):
         for done, num_points in enumerate(numbers_of_points):
             progress(done, len(numbers_of_points))
             points = torch.from_numpy(clouds.cut(num_points).points)

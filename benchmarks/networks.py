@@ -20,7 +20,7 @@ from benchmarks.workers import Worker
 from doorstate._jobs import Progress
 from doorstate.errors import RunError
 from doorstate.evaluation.table import Table
-from doorstate.training.environment import bf16_is_quick
+from doorstate.training.environment import has_fast_bf16
 
 INFERENCE_BATCHES = (1, 16)
 Round = dict[str, float]  # train_ms, infer_1_ms, infer_16_ms per cloud, and peak_gflops of the round
@@ -122,7 +122,7 @@ class _Contestant:
 def _measure(plan: Plan, network: str, clouds: Clouds, peak: Worker, tick: Callable[[], None]) -> Group:
     with Worker(OperationCount, network, clouds) as counter:
         gflop = counter.call("training_gflop")
-    precisions = (False, True) if bf16_is_quick() else (False,)
+    precisions = (False, True) if has_fast_bf16() else (False,)
     with ExitStack() as stack:
         contestants = [
             _Contestant(form, stack.enter_context(Worker(Subject, _task(plan, network, form, clouds))))

@@ -16,7 +16,7 @@ from benchmarks.tables import milliseconds
 from benchmarks.workers import Worker
 from doorstate._jobs import Progress
 from doorstate.evaluation.table import UNDEFINED, Table
-from doorstate.training.environment import bf16_is_quick
+from doorstate.training.environment import has_fast_bf16
 
 # An operator belongs to the first group that has a part of its name; `_Name` is an autograd function of our own.
 GROUPS: dict[str, tuple[str, ...]] = {
@@ -72,7 +72,7 @@ def group_of(operator: str) -> str:
 
 def profiled_forms(which: str) -> list[Form]:
     """The plain form, the fast form as it trains here, or both, in the order before and after."""
-    bf16 = bf16_is_quick()
+    bf16 = has_fast_bf16()
     fast = Form("fast bf16" if bf16 else "fast fp32", "fast", bf16)
     return {"plain": [PLAIN], "fast": [fast], "both": [PLAIN, fast]}[which]
 

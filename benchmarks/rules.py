@@ -20,7 +20,7 @@ from doorstate.inference.rule_predictor import RulePredictor
 from doorstate.networks import create_network
 from doorstate.networks.card import WeightsCard
 from doorstate.rules import list_rules
-from doorstate.training.fit import threads as use_threads
+from doorstate.training.run import torch_threads
 from doorstate.types import Points
 
 BESIDE = ("mvcnn", "pointnet2")
@@ -38,7 +38,7 @@ def measure(count: int, points: int, threads: int, repeats: int, progress: Progr
             TorchBackend(create_network(name), WeightsCard(network=name, num_points=points))
         )
     rows = []
-    with use_threads(threads):
+    with torch_threads(threads):
         for done, (name, predict) in enumerate(methods.items()):
             progress(done, len(methods))
             predict(clouds[0])

@@ -19,7 +19,7 @@ from doorstate.cli.console import progress_bar
 from doorstate.clouds.preparation import CloudSpec
 from doorstate.dataset.prepare import Preparation, prepare_dataset
 from doorstate.io.find import find_clouds
-from doorstate.training.comparison import load_experiment
+from doorstate.training.experiment import load_experiment
 from doorstate.training.run_folder import run_of
 from doorstate.types import UNITS_M
 

@@ -75,7 +75,8 @@ def again(network: str, fold: int, name: str = "paper") -> str | None:
     """
     from doorstate.cli.run_display import live_runs
     from doorstate.evaluation.metrics import mean_and_deviation
-    from doorstate.training.comparison import RunSpec, load_experiment, train_fold
+    from doorstate.training.comparison import RunSpec, train_fold
+    from doorstate.training.experiment import load_experiment
     from doorstate.training.run_folder import RunFolder, run_of
 
     experiment = load_experiment(EXPERIMENTS / f"{name}.toml", {})

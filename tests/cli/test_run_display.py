@@ -14,10 +14,10 @@ from rich.console import Console
 from doorstate.cli import run_display
 from doorstate.cli.run_display import RunDisplay, live_runs
 from doorstate.training.comparison import RunSpec
-from doorstate.training.recipes import Recipe, Stage
+from doorstate.training.recipes import CoarseStage, Recipe
 from doorstate.training.run_folder import RunFolder
 
-RECIPE = Recipe(name="x", epochs=10, coarse_to_fine=(Stage(share=0.5, points=256),))
+RECIPE = Recipe(name="x", epochs=10, coarse_to_fine=(CoarseStage(share=0.5, points=256),))
 RECIPES = {"pointnet": RECIPE, "dgcnn": RECIPE}
 
 

@@ -15,7 +15,8 @@ import pytest
 from doorstate.dataset.splits import Role, write_splits
 from doorstate.dataset.store import PreparedDataset, open_dataset
 from doorstate.simulation.settings import settings_for
-from doorstate.training.comparison import compare, load_experiment
+from doorstate.training.comparison import compare
+from doorstate.training.experiment import load_experiment
 from doorstate.training.run_folder import RunFolder
 from paper import reproduce as module
 

@@ -15,7 +15,8 @@ from doorstate.evaluation.results import load_results
 from doorstate.inference.predictor import Predictor
 from doorstate.networks.weights import read_card
 from doorstate.training.calibration import at_temperature
-from doorstate.training.comparison import Experiment, compare, prepare_comparison
+from doorstate.training.comparison import compare, prepare_comparison
+from doorstate.training.experiment import Experiment
 from doorstate.types import NO_DOOR
 
 RECIPE = {"epochs": 1, "batch_size": 8, "precision": "fp32", "coarse_to_fine": []}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Temperature scaling against a grid search, softmax of scaled logits, and data with a known answer."""
+"""Temperature scaling against a grid search, against softmax of scaled logits, and on drawn labels."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from scipy.special import log_softmax, softmax
 from doorstate.training.calibration import abstain_threshold, at_temperature, fit_temperature
 
 
-def drawn(temperature: float, samples: int = 20_000) -> tuple[np.ndarray, np.ndarray]:
-    """Labels drawn from softmax(logits / temperature), and the probabilities of a network that says softmax(logits)."""
+def draw_labels(temperature: float, samples: int = 20_000) -> tuple[np.ndarray, np.ndarray]:
+    """Return softmax(logits), and labels drawn from softmax(logits / temperature)."""
     rng = np.random.default_rng(0)
     logits = rng.normal(0, 3, (samples, 3))
     edges = softmax(logits / temperature, axis=1).cumsum(axis=1)
@@ -22,13 +22,13 @@ def drawn(temperature: float, samples: int = 20_000) -> tuple[np.ndarray, np.nda
 
 
 @pytest.mark.parametrize("temperature", [0.5, 1.0, 2.5])
-def test_the_temperature_that_made_the_labels_is_found(temperature: float) -> None:
-    assert fit_temperature(*drawn(temperature)) == pytest.approx(temperature, rel=0.05)
+def test_temperature_of_drawn_labels(temperature: float) -> None:
+    assert fit_temperature(*draw_labels(temperature)) == pytest.approx(temperature, rel=0.05)
 
 
-def test_it_is_the_minimum_of_a_grid() -> None:
-    probabilities, labels = drawn(1.7, 200)
-    found = fit_temperature(probabilities, labels)
+def test_temperature_is_the_minimum_of_a_grid() -> None:
+    probabilities, labels = draw_labels(1.7, 200)
+    fitted = fit_temperature(probabilities, labels)
     targets = np.full((200, 3), 1 / 203)
     targets[np.arange(200), labels] = 201 / 203
 
@@ -36,10 +36,10 @@ def test_it_is_the_minimum_of_a_grid() -> None:
         return float(-(targets * log_softmax(np.log(probabilities) / temperature, axis=1)).sum())
 
     grid = np.geomspace(0.05, 20, 4000)
-    assert found == pytest.approx(grid[np.argmin([loss(t) for t in grid])], rel=2e-3)
+    assert fitted == pytest.approx(grid[np.argmin([loss(t) for t in grid])], rel=2e-3)
 
 
-def test_without_errors_it_sharpens_but_never_to_certainty() -> None:
+def test_without_errors_probabilities_stay_below_1() -> None:
     labels = np.arange(300) % 3
     probabilities = np.full((300, 3), 0.05)
     probabilities[np.arange(300), labels] = 0.9
@@ -50,13 +50,13 @@ def test_without_errors_it_sharpens_but_never_to_certainty() -> None:
 
 @given(st.lists(st.floats(-30, 30), min_size=3, max_size=3), st.floats(0.05, 20))
 @settings(deadline=None)
-def test_probabilities_alone_are_enough(logits: list[float], temperature: float) -> None:
+def test_scaling_needs_probabilities_only(logits: list[float], temperature: float) -> None:
     row = np.array([logits])
     expected = softmax(row / temperature, axis=1)
     np.testing.assert_allclose(at_temperature(softmax(row, axis=1), temperature), expected, atol=1e-6)
 
 
-def test_a_probability_of_zero_is_no_error() -> None:
+def test_probability_of_0_stays_finite() -> None:
     scaled = at_temperature(np.array([[1.0, 0.0, 0.0]]), 2.0)
     assert np.isfinite(scaled).all()
     assert scaled.sum() == pytest.approx(1)
@@ -66,17 +66,17 @@ def test_a_probability_of_zero_is_no_error() -> None:
     st.lists(st.tuples(st.sampled_from([0.4, 0.5, 0.6, 0.9]), st.booleans()), min_size=1, max_size=30),
     st.sampled_from([0.0, 0.1, 0.5, 1.0]),
 )
-def test_the_threshold_keeps_as_many_answers_as_it_may(
-    answers: list[tuple[float, bool]], error_share: float
+def test_threshold_keeps_as_many_predictions_as_allowed(
+    predictions: list[tuple[float, bool]], error_share: float
 ) -> None:
-    sure = np.array([each for each, _ in answers])
-    right = np.array([each for _, each in answers])
-    probabilities = np.stack([sure, (1 - sure) / 2, (1 - sure) / 2], axis=1)
-    found = abstain_threshold(probabilities, np.where(right, 0, 1), error_share)
-    kept = sure >= found
-    assert (~right[kept]).sum() <= error_share * kept.sum()
-    for lower in [0.0, *sure[sure < found]]:
-        more = sure >= lower
+    confidence = np.array([probability for probability, _ in predictions])
+    correct = np.array([is_correct for _, is_correct in predictions])
+    probabilities = np.stack([confidence, (1 - confidence) / 2, (1 - confidence) / 2], axis=1)
+    threshold = abstain_threshold(probabilities, np.where(correct, 0, 1), error_share)
+    kept = confidence >= threshold
+    assert (~correct[kept]).sum() <= error_share * kept.sum()
+    for lower in [0.0, *confidence[confidence < threshold]]:
+        more = confidence >= lower
         if more.sum() > kept.sum():
-            assert (~right[more]).sum() > error_share * more.sum()
-    assert 0 <= found < 1
+            assert (~correct[more]).sum() > error_share * more.sum()
+    assert 0 <= threshold < 1

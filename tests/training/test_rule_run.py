@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs of rules: the same files as a network's, with reasons and angles, and whatever was found where they erred."""
+"""Runs of rules: predictions with reasons and angles, scores, detections where the rule was wrong."""
 
 from __future__ import annotations
 
@@ -17,8 +17,9 @@ from doorstate.dataset.splits import Role
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import ConfigError, DatasetError
 from doorstate.rules import create_rule, list_rules
-from doorstate.training.comparison import Experiment, compare
-from doorstate.training.rule_run import RuleRunConfig, answer
+from doorstate.training.comparison import compare
+from doorstate.training.experiment import Experiment
+from doorstate.training.rule_run import RuleRunConfig, run_rule
 from doorstate.types import ABSTAINED, STATES
 
 
@@ -34,9 +35,9 @@ def config(rule: str) -> RuleRunConfig:
     return RuleRunConfig(rule=rule, parameters={}, dataset="d", protocol="paper", fold=0)
 
 
-def test_answers_are_those_of_the_rule_on_raw_frames(doors: PreparedDataset, tmp_path: Path) -> None:
+def test_predictions_are_those_of_the_rule_on_raw_frames(doors: PreparedDataset, tmp_path: Path) -> None:
     roles: dict[str, Role] = {row["sample_id"]: "test" for row in doors.rows[:9]}
-    metrics = answer(config("plane_state"), doors, roles, tmp_path)
+    metrics = run_rule(config("plane_state"), doors, roles, tmp_path)
     rows = read_csv(tmp_path / "predictions.csv")
     assert [row["sample_id"] for row in rows] == list(roles)
     rule = create_rule("plane_state")
@@ -56,32 +57,32 @@ def test_answers_are_those_of_the_rule_on_raw_frames(doors: PreparedDataset, tmp
     )
     assert metrics["test_macro_f1"] == pytest.approx(oracle)
     assert metrics["abstained"] == sum(row["predicted"] == ABSTAINED for row in rows)
-    missed = {row["sample_id"] for row in rows if row["predicted"] != row["state"]}
-    found = [json.loads(line) for line in (tmp_path / "detections.jsonl").read_text().splitlines()]
-    assert {each["sample_id"] for each in found} == missed
-    for each in found:
-        for name, points in each["detections"]:
+    wrong = {row["sample_id"] for row in rows if row["predicted"] != row["state"]}
+    records = [json.loads(line) for line in (tmp_path / "detections.jsonl").read_text().splitlines()]
+    assert {record["sample_id"] for record in records} == wrong
+    for record in records:
+        for name, points in record["detections"]:
             assert name
             assert np.shape(points)[1:] == (3,)
 
 
-def test_a_finished_run_is_not_asked_again_and_an_empty_one_refused(
-    doors: PreparedDataset, tmp_path: Path
-) -> None:
+def test_finished_run_is_returned_and_empty_run_refused(doors: PreparedDataset, tmp_path: Path) -> None:
     roles: dict[str, Role] = {doors.rows[0]["sample_id"]: "test"}
-    first = answer(config("depth_region"), doors, roles, tmp_path / "a")
-    assert answer(config("depth_region"), doors, {}, tmp_path / "a") == first
-    with pytest.raises(DatasetError, match="no sample with a door is tested in fold 0"):
-        answer(config("depth_region"), doors, {}, tmp_path / "b")
+    first = run_rule(config("depth_region"), doors, roles, tmp_path / "a")
+    assert run_rule(config("depth_region"), doors, {}, tmp_path / "a") == first
+    with pytest.raises(DatasetError, match="fold 0"):
+        run_rule(config("depth_region"), doors, {}, tmp_path / "b")
 
 
-def test_a_rule_is_not_asked_for_the_state_of_no_door(scene_dataset: PreparedDataset, tmp_path: Path) -> None:
+def test_rules_are_not_applied_to_scenes_without_a_door(
+    scene_dataset: PreparedDataset, tmp_path: Path
+) -> None:
     roles: dict[str, Role] = {row["sample_id"]: "test" for row in scene_dataset.rows[-14:]}
-    answer(config("depth_region"), scene_dataset, roles, tmp_path)
+    run_rule(config("depth_region"), scene_dataset, roles, tmp_path)
     assert {row["state"] for row in read_csv(tmp_path / "predictions.csv")} <= set(STATES)
 
 
-def test_rules_stand_beside_networks_in_a_comparison(doors: PreparedDataset, tmp_path: Path) -> None:
+def test_comparison_of_networks_and_rules(doors: PreparedDataset, tmp_path: Path) -> None:
     experiment = Experiment(
         name="both",
         dataset=str(doors.folder),
@@ -91,9 +92,9 @@ def test_rules_stand_beside_networks_in_a_comparison(doors: PreparedDataset, tmp
         num_points=128,
         recipe_changes={"epochs": 1, "batch_size": 8, "precision": "fp32"},
     )
-    found = compare(experiment, tmp_path / "c")
-    assert [run["method"] for run in found] == ["pointnet", "angle_bins", "wall_leaf_angle"]
-    with pytest.raises(ConfigError, match="there is no rule 'angle'"):
+    metrics = compare(experiment, tmp_path / "c")
+    assert [run_metrics["method"] for run_metrics in metrics] == ["pointnet", "angle_bins", "wall_leaf_angle"]
+    with pytest.raises(ConfigError, match="angle"):
         experiment.model_copy(update={"rules": ("angle",)}).check()
 
 

@@ -12,7 +12,7 @@ from doorstate.cli.options import Changes, Heads, Jobs, recipe_changes, split_na
 from doorstate.errors import ConfigError
 
 if TYPE_CHECKING:
-    from doorstate.training.comparison import Experiment
+    from doorstate.training.experiment import Experiment
 
 
 def compare(
@@ -46,7 +46,7 @@ def compare(
     """
     from doorstate.cli.console import print_table, stdout
     from doorstate.dataset.splits import EVERYTHING
-    from doorstate.training.comparison import load_experiment
+    from doorstate.training.experiment import load_experiment
 
     if experiment is None and data is None:
         raise ConfigError("give an experiment file or --data")

@@ -40,12 +40,13 @@ def resolution(
         resolution_table,
         write_resolution,
     )
-    from doorstate.training.resolution import load_study
+    from doorstate.training.resolution import ResolutionStudy
+    from doorstate.training.study import load_study
 
-    settings = load_study(study)
+    settings = load_study(study, ResolutionStudy)
     folder = out or Path("runs") / settings.name
-    for name, experiment in settings.experiments():
-        compare_with_display(experiment, folder / name, jobs)
+    for part in list(settings.parts()):
+        compare_with_display(part.experiment, folder / part.folder, jobs)
     if not (folder / LATENCY).is_file():
         _measure_latency(settings, folder)
     write_resolution(folder, folder / "report")

@@ -40,7 +40,8 @@ def train(
     from doorstate.cli.run_display import live_runs
     from doorstate.dataset.splits import draw_splits, write_splits
     from doorstate.dataset.store import open_dataset
-    from doorstate.training.comparison import RunSpec, load_experiment, train_fold
+    from doorstate.training.comparison import RunSpec, train_fold
+    from doorstate.training.experiment import load_experiment
     from doorstate.training.run_folder import RunFolder
 
     settings = {

@@ -30,14 +30,15 @@ def transfer(
     from doorstate.cli.compare import compare_with_display
     from doorstate.cli.console import print_table, stdout
     from doorstate.evaluation.transfer import load_transfer_results, transfer_table, write_transfer
-    from doorstate.training.transfer import load_transfer
+    from doorstate.training.study import load_study
+    from doorstate.training.transfer import TransferStudy
 
-    settings = load_transfer(study)
+    settings = load_study(study, TransferStudy)
     folder = out or Path("runs") / settings.name
-    cells = list(settings.cells())
-    settings.write_splits(folder)
-    for cell in cells:
-        compare_with_display(cell.experiment, folder / cell.folder, jobs)
+    parts = list(settings.parts())
+    settings.prepare(folder)
+    for part in parts:
+        compare_with_display(part.experiment, folder / part.folder, jobs)
     results = load_transfer_results(folder, tuple(settings.trained), tuple(settings.tested))
     table = transfer_table(results)
     print_table(table.title, table.columns, table.rows)

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Training: recipes, one run, one comparison."""
+"""Training: recipes, runs, comparisons and studies."""

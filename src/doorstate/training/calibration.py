@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Temperature scaling: one number per network that makes its probabilities mean what they say (Guo et al. 2017)."""
+"""Temperature scaling (Guo et al. 2017), and the probability below which a network abstains."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ _SMALLEST = 1e-30
 
 
 def fit_temperature(probabilities: Probabilities, labels: NDArray[np.int64]) -> float:
-    """Temperature of least cross entropy on samples that the weights were not fitted to.
+    """Return the temperature with the least cross entropy on held-out samples.
 
-    The targets are a little less than certain, (M + 1) / (M + C) for the true class (Platt 1999): otherwise a network
-    without errors among M samples would be told to be infinitely sure.
+    The target of the true class is (M + 1) / (M + C), as in Platt 1999; with a target of 1 the temperature of a network
+    without errors on the M samples would be 0.
 
     Args:
         probabilities: (M, C) at temperature 1.
@@ -31,12 +31,12 @@ def fit_temperature(probabilities: Probabilities, labels: NDArray[np.int64]) -> 
         scaled = at_temperature(probabilities, float(np.exp(log_temperature)))
         return float(-(targets * np.log(np.maximum(scaled, _SMALLEST))).sum() / samples)
 
-    found = minimize_scalar(cross_entropy, bounds=_LOG_BOUNDS, method="bounded")
-    return float(np.exp(found.x))
+    minimum = minimize_scalar(cross_entropy, bounds=_LOG_BOUNDS, method="bounded")
+    return float(np.exp(minimum.x))
 
 
 def at_temperature(probabilities: Probabilities, temperature: float) -> Probabilities:
-    """(M, C) probabilities at another temperature: softmax(logits / T), from the softmax alone."""
+    """Return softmax(logits / temperature) for (M, C) probabilities softmax(logits)."""
     logits = np.log(np.maximum(probabilities, _SMALLEST)) / temperature
     powers = np.exp(logits - logits.max(axis=-1, keepdims=True))
     scaled: Probabilities = powers / powers.sum(axis=-1, keepdims=True)
@@ -44,22 +44,22 @@ def at_temperature(probabilities: Probabilities, temperature: float) -> Probabil
 
 
 def abstain_threshold(probabilities: Probabilities, labels: NDArray[np.int64], error_share: float) -> float:
-    """Least probability of an answer from which on no more than a share of all answers are wrong; 0 if all may stay.
+    """Return the lowest probability from which on at most a share of the predictions is wrong.
 
-    One that no answer reaches, if even the surest are wrong too often.
+    0 if all predictions may be kept; a value above all probabilities if none may.
 
     Args:
-        probabilities: (M, C) of samples that the weights were not fitted to.
+        probabilities: (M, C) of held-out samples.
         labels: (M,) true classes.
-        error_share: of the answers that are still given.
+        error_share: largest share of wrong predictions among those kept.
     """
-    sure = probabilities.max(axis=1)
-    order = np.argsort(-sure, kind="stable")
-    wrong = (probabilities.argmax(axis=1) != labels)[order].cumsum()
-    given = np.arange(1, len(sure) + 1)
-    # Answers of the same probability stay or go together.
-    last_of_equals = np.append(sure[order][1:] < sure[order][:-1], True)
-    allowed = np.flatnonzero(last_of_equals & (wrong <= error_share * given))
+    confidence = probabilities.max(axis=1)
+    order = np.argsort(-confidence, kind="stable")
+    errors = (probabilities.argmax(axis=1) != labels)[order].cumsum()
+    kept = np.arange(1, len(confidence) + 1)
+    # Predictions with the same probability are kept or dropped together.
+    last_of_equals = np.append(confidence[order][1:] < confidence[order][:-1], True)
+    allowed = np.flatnonzero(last_of_equals & (errors <= error_share * kept))
     if len(allowed) == 0:
-        return float(np.nextafter(sure.max(initial=0.0), 1))
-    return 0.0 if allowed[-1] == len(sure) - 1 else float(sure[order][allowed[-1]])
+        return float(np.nextafter(confidence.max(initial=0.0), 1))
+    return 0.0 if allowed[-1] == len(confidence) - 1 else float(confidence[order][allowed[-1]])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Description of the machine and the libraries that a result was made with."""
+"""Machine and libraries of a result, and optional speed-ups of the machine."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _R = TypeVar("_R")
 
 
 def describe_environment() -> dict[str, str | int | bool]:
-    """Versions, processor and threads."""
+    """Return versions, processor and number of threads."""
     import torch
 
     return {
@@ -30,13 +30,13 @@ def describe_environment() -> dict[str, str | int | bool]:
         "platform": platform.platform(),
         "processor": processor_name(),
         "threads": torch.get_num_threads(),
-        "bf16": bf16_is_quick(),
+        "bf16": has_fast_bf16(),
         "cuda": torch.version.cuda or "" if torch.cuda.is_available() else "",
     }
 
 
 def processor_name() -> str:
-    """The processor's name where the system tells it."""
+    """Return the name of the processor, or its architecture where the system has no name."""
     cpuinfo = Path("/proc/cpuinfo")
     if cpuinfo.is_file():
         for line in cpuinfo.read_text(encoding="utf-8", errors="replace").splitlines():
@@ -45,8 +45,8 @@ def processor_name() -> str:
     return platform.processor() or platform.machine()
 
 
-def bf16_is_quick() -> bool:
-    """Whether this machine multiplies bf16 matrices in hardware."""
+def has_fast_bf16() -> bool:
+    """Return True if this machine multiplies bf16 matrices in hardware."""
     import torch
 
     if torch.cuda.is_available():
@@ -54,21 +54,21 @@ def bf16_is_quick() -> bool:
     return bool(torch.cpu._is_avx512_bf16_supported() or torch.cpu._is_amx_tile_supported())
 
 
-def compiled(function: Callable[_P, _R]) -> Callable[_P, _R]:
-    """A function through torch.compile, or as it is from the first time that fails, with one warning in the log."""
+def compile_if_possible(function: Callable[_P, _R]) -> Callable[_P, _R]:
+    """Return a function compiled by torch.compile; after a failure it runs uncompiled, with one warning in the log."""
     import torch
     from torch._dynamo.exc import TorchDynamoException  # takes a second to import
 
-    quick: Callable[_P, _R] | None = torch.compile(function)
+    fast: Callable[_P, _R] | None = torch.compile(function)
 
     @wraps(function)
     def call(*arguments: _P.args, **options: _P.kwargs) -> _R:
-        nonlocal quick
-        if quick is not None:
+        nonlocal fast
+        if fast is not None:
             try:
-                return quick(*arguments, **options)
+                return fast(*arguments, **options)
             except TorchDynamoException as error:
-                quick = None
+                fast = None
                 reason = str(error).strip().partition("\n")[0]
                 logging.getLogger(__name__).warning("torch.compile failed (%s): running uncompiled", reason)
         return function(*arguments, **options)

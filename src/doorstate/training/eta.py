@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How long a comparison will still take, from what its epochs took so far."""
+"""Estimate of the time that a comparison still needs, from the durations of its finished epochs."""
 
 from __future__ import annotations
 
@@ -8,44 +8,52 @@ from collections.abc import Mapping, Sequence
 from statistics import fmean
 
 from doorstate.training.comparison import RunSpec
-from doorstate.training.recipes import Recipe, Resolution, resolution_of_epoch
+from doorstate.training.recipes import Recipe
+from doorstate.training.schedules import Resolution, resolution_of_epoch
 
-_Known = Mapping[Resolution, Sequence[float]]
+_Durations = Mapping[Resolution, Sequence[float]]  # seconds of each finished epoch
 
 
 def eta_seconds(runs: Sequence[RunSpec], recipes: Mapping[str, Recipe], num_points: int) -> float | None:
-    """Seconds that one job after the other would need for what is left; None before the first epoch is done.
+    """Return the seconds that the unfinished runs need one after another; None before the first epoch is done.
 
     Args:
-        runs: finished, begun and waiting.
-        recipes: by network.
-        num_points: of each cloud at the end of a run.
+        runs: all runs of the comparison.
+        recipes: by network; runs of rules take seconds and are not counted.
+        num_points: of each cloud in the last epochs.
     """
-    known: dict[str, dict[Resolution, list[float]]] = defaultdict(lambda: defaultdict(list))
-    for run in runs:
-        for line in run.folder.read_log():
-            resolution = Resolution(int(line["points"]), float(line.get("centres", 1)))
-            known[run.method][resolution].append(float(line["seconds"]))
-    if not known:
+    durations = _durations_by_method(runs)
+    if not durations:
         return None
-    left = 0.0
+    # A network without a finished epoch is estimated from another network.
+    default = next(iter(durations.values()))
+    total = 0.0
     for run in runs:
-        if run.folder.finished or run.method not in recipes:  # rules take seconds
+        if run.folder.finished or run.method not in recipes:
             continue
-        recipe, done = recipes[run.method], run.folder.read_position()
-        # Another network's epochs are a better guess than none.
-        own = known[run.method] if run.method in known else next(iter(known.values()))
-        for epoch in range(int(done), recipe.epochs):
-            share = 1 - (done - epoch) if epoch < done else 1.0
-            left += share * _epoch_seconds(own, resolution_of_epoch(recipe, epoch, num_points))
-    return left
+        recipe, position = recipes[run.method], run.folder.read_position()
+        epoch_durations = durations.get(run.method, default)
+        for epoch in range(int(position), recipe.epochs):
+            share = 1 - (position - epoch) if epoch < position else 1.0
+            resolution = resolution_of_epoch(recipe, epoch, num_points)
+            total += share * _epoch_seconds(epoch_durations, resolution)
+    return total
 
 
-def _epoch_seconds(known: _Known, wanted: Resolution) -> float:
-    """Mean of the epochs at this resolution, or at the nearest, in proportion to points and centres."""
-    nearest = min(known, key=lambda each: abs(_size(each) - _size(wanted)))
-    return fmean(known[nearest]) * _size(wanted) / _size(nearest)
+def _durations_by_method(runs: Sequence[RunSpec]) -> dict[str, _Durations]:
+    durations: dict[str, dict[Resolution, list[float]]] = defaultdict(lambda: defaultdict(list))
+    for run in runs:
+        for entry in run.folder.read_log():
+            resolution = Resolution(int(entry["points"]), float(entry["centres"]))
+            durations[run.method][resolution].append(float(entry["seconds"]))
+    return dict(durations)
+
+
+def _epoch_seconds(durations: _Durations, resolution: Resolution) -> float:
+    """Return the mean duration at the nearest resolution, in proportion to points times centres."""
+    nearest = min(durations, key=lambda finished: abs(_size(finished) - _size(resolution)))
+    return fmean(durations[nearest]) * _size(resolution) / _size(nearest)
 
 
 def _size(resolution: Resolution) -> float:
-    return resolution.points * resolution.centres
+    return resolution.num_points * resolution.centre_share

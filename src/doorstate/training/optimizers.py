@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The optimisers of a recipe: one for all of a network, or Muon for its matrices and AdamW for the rest."""
+"""Optimizers of a recipe: one for all parameters, or Muon for the matrices and AdamW for the rest."""
 
 from __future__ import annotations
 
@@ -12,32 +12,38 @@ from torch.optim import SGD, Adam, AdamW, Optimizer
 from doorstate.errors import ConfigError
 from doorstate.training.recipes import Recipe
 
-_MATRIX = 16  # channels; to orthogonalise a layer from coordinates, or to a few answers, makes no sense
+_MIN_CHANNELS = (
+    16  # of a matrix for Muon: layers from coordinates or to few outputs are not worth orthogonalising
+)
 
 
 def create_optimizers(recipe: Recipe, network: nn.Module) -> list[Optimizer]:
-    """Optimisers that share a network's parameters among them; each takes the recipe's rate at every step.
+    """Return optimizers that cover every parameter of a network once, with the recipe's learning rate.
 
     Raises:
-        ConfigError: this torch has no Muon.
+        ConfigError: the recipe needs Muon, and this torch does not have it.
     """
     if recipe.optimizer != "muon":
-        return [_of_all(recipe, network.parameters())]
+        return [_single_optimizer(recipe, network.parameters())]
     if not hasattr(torch.optim, "Muon"):
-        raise ConfigError(f"optimizer muon needs torch 2.9 or newer; this is {torch.__version__}")
+        raise ConfigError(
+            f"torch {torch.__version__} has no Muon",
+            field="optimizer",
+            expected="torch 2.9 or newer for muon",
+        )
     matrices: list[nn.Parameter] = []
-    others: list[nn.Parameter] = []
+    rest: list[nn.Parameter] = []
     for parameter in network.parameters():
-        is_matrix = parameter.ndim == 2 and min(parameter.shape) >= _MATRIX
-        (matrices if is_matrix else others).append(parameter)
-    # Liu et al. 2025 (arXiv:2502.16982): updates as large as AdamW's, so that its rates and weight decay serve both.
+        is_matrix = parameter.ndim == 2 and min(parameter.shape) >= _MIN_CHANNELS
+        (matrices if is_matrix else rest).append(parameter)
+    # Liu et al. 2025 (arXiv:2502.16982): updates as large as AdamW's, so one rate and weight decay serve both.
     muon = torch.optim.Muon(
         matrices, recipe.learning_rate, recipe.weight_decay, adjust_lr_fn="match_rms_adamw"
     )
-    return [muon, _of_all(recipe, others)]
+    return [muon, _single_optimizer(recipe, rest)]
 
 
-def _of_all(recipe: Recipe, parameters: Iterable[nn.Parameter]) -> Optimizer:
+def _single_optimizer(recipe: Recipe, parameters: Iterable[nn.Parameter]) -> Optimizer:
     rate, decay = recipe.learning_rate, recipe.weight_decay
     if recipe.optimizer == "sgd":
         return SGD(parameters, rate, momentum=recipe.momentum, weight_decay=decay)

@@ -1,100 +1,97 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How networks are trained: one common recipe for all five, and each author's own (NETWORKS sections 2 to 6)."""
+"""Training recipes: one common to all networks, and the one that the authors of each network published."""
 
 from __future__ import annotations
 
 import math
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
-from pydantic import Field, NonNegativeFloat, SerializerFunctionWrapHandler, model_serializer
+from pydantic import Field, NonNegativeFloat, field_validator
 
 from doorstate._models import FrozenModel
 from doorstate.clouds.augmentation import Augmentation
-from doorstate.clouds.preparation import NUM_POINTS
+from doorstate.clouds.preparation import MIN_POINTS
 from doorstate.errors import ConfigError
 
+RECIPES = ("common", "authors")
 
-class Stage(FrozenModel):
-    """A share of the epochs on less of each cloud; clouds are progressive, so that is a slice."""
+
+class CoarseStage(FrozenModel):
+    """Share of the epochs that uses the first points of each cloud and the first centres of the network."""
 
     share: float = Field(gt=0, le=1)
-    points: int = Field(ge=128)
-    centres: float = Field(default=1.0, gt=0, le=1)  # share of the network's centres, where it has any
-
-
-class Resolution(NamedTuple):
-    """How much of each cloud an epoch looks at: points, and the share of the network's centres."""
-
-    points: int
-    centres: float
+    points: int = Field(ge=MIN_POINTS)
+    centres: float = Field(default=1.0, gt=0, le=1)  # share of the network's centres
 
 
 class Recipe(FrozenModel):
-    """Everything that decides how a network is trained but the data and the network."""
+    """Everything that decides how a network is trained, except the data and the network."""
 
     name: str
-    epochs: int = Field(default=30, ge=0)  # 0 tests the weights that a run starts from
-    clouds_per_epoch: int | None = Field(default=None, ge=2)  # drawn anew for every epoch; None is all
+    epochs: int = Field(default=30, ge=0)  # 0: only test the weights that the run starts from
+    clouds_per_epoch: int | None = Field(default=None, ge=2)  # drawn for each epoch; None: all
     batch_size: int = Field(default=16, ge=2)
     optimizer: Literal["adamw", "adam", "sgd", "muon"] = "adamw"
-    learning_rate: float = Field(default=2e-3, gt=0)
+    learning_rate: float = Field(default=2e-3, gt=0)  # the highest of the schedule
     min_learning_rate: float = Field(default=0.0, ge=0)
     weight_decay: float = Field(default=0.05, ge=0)
     adam_eps: float = 1e-8
     momentum: float = 0.9  # SGD
     schedule: Literal["one-cycle", "cosine", "steps"] = "one-cycle"
-    warmup: float = Field(default=0.2, gt=0, lt=1)  # one-cycle: share of the steps that rise
-    step_factor: float = 0.7  # steps: what the rate is multiplied by ...
-    step_epochs: int = 20  # ... every so many epochs
-    step_iterations: int | None = None  # ... or every so many iterations
-    label_smoothing: float = Field(default=0.1, ge=0, lt=1)  # torch's formula
-    gradient_clip: float | None = 10.0
+    warmup: float = Field(default=0.2, gt=0, lt=1)  # one-cycle: share of the training in which the rate rises
+    step_factor: float = 0.7  # steps: factor of the rate after each step
+    step_epochs: int = 20  # steps: epochs between steps
+    step_iterations: int | None = None  # steps: iterations between steps, in place of step_epochs
+    label_smoothing: float = Field(default=0.1, ge=0, lt=1)  # as in torch.nn.CrossEntropyLoss
+    gradient_clip: float | None = 10.0  # largest norm of the gradient
     batchnorm_eps: float | None = None  # None: torch's 1e-5
-    batchnorm_momentum: tuple[float, float] | None = None  # first and last, halved with every step
+    batchnorm_momentum: tuple[float, float] | None = None  # first and last; halved after each step
     augmentation: Augmentation = Augmentation()
-    coarse_to_fine: tuple[Stage, ...] = ()  # what the shares leave is trained on all points and centres
+    coarse_to_fine: tuple[CoarseStage, ...] = ()  # the last epochs use all points and centres
     part_points: int | None = Field(
         default=None, ge=1
-    )  # of each cloud that parts are learned on; None is all
-    # What the loss of a head, or of the "state", counts in the sum of them; 1 where nothing is said.
-    loss_weights: dict[str, NonNegativeFloat] = Field(default_factory=dict)
+    )  # points of each cloud in the loss of the parts; None: all
+    loss_weights: dict[str, NonNegativeFloat] = Field(default_factory=dict)  # by head or "state"; default 1
     precision: Literal["auto", "fp32", "bf16"] = "auto"
-    compile: bool = False  # torch.compile; docs/speed.md has what it brings
+    compile: bool = False  # torch.compile; docs/speed.md has its effect
 
-    @model_serializer(mode="wrap")
-    def _omit_defaults(self, fields: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        # Runs that were begun before there were these go on.
-        later = ("clouds_per_epoch", "part_points", "loss_weights")
-        return {
-            name: value
-            for name, value in fields(self).items()
-            if name not in later or value not in (None, {})
-        }
+    @field_validator("coarse_to_fine")
+    @classmethod
+    def _check_shares(cls, stages: tuple[CoarseStage, ...]) -> tuple[CoarseStage, ...]:
+        if sum(stage.share for stage in stages) >= 1:
+            raise ValueError("shares must add up to less than 1: the last epochs use all points")
+        return stages
 
 
-# Yaw stays near the true heading: the frame is the sensor's and its x axis is where the robot looks. Nothing moves
-# one point against another, so neighbours are searched once per cloud. Mirrored and scaled doors are other doors than
-# those of `ogurob`, and learning them too took PointNet more than twice as long (ADR 5).
+# Yaw stays small because x is the viewing direction of the robot. A rotation keeps distances, so neighbours are
+# searched once per cloud. Mirrored and scaled doors do not occur in `ogurob`, and learning them too took PointNet
+# more than twice as long (docs/adr/0005).
 COMMON = Recipe(name="common", augmentation=Augmentation(yaw_deg=15.0))
 
 
-class _Own(NamedTuple):
-    """What of the common recipe each network has of its own."""
+class _NetworkSettings(NamedTuple):
+    """Fields of the common recipe that differ between networks."""
 
     epochs: int
-    stages: tuple[Stage, ...]
+    coarse_to_fine: tuple[CoarseStage, ...]
     batch_size: int = COMMON.batch_size
     learning_rate: float = COMMON.learning_rate
 
 
-# How long, on how much of each cloud, and how many clouds a step: what each network needs on `ogurob`, from the
-# validation samples of fold 0 (ADR 5). PointNet++ and Point2Sequence spend their time on centres, the others on points.
-_OWN = {
-    "pointnet": _Own(45, (Stage(share=0.667, points=512), Stage(share=0.267, points=1024)), 32, 3e-3),
-    "pointnet2": _Own(8, (Stage(share=0.75, points=1024, centres=0.5),)),
-    "dgcnn": _Own(18, (Stage(share=0.72, points=256), Stage(share=0.22, points=1024)), 32, 3e-3),
-    "pointcnn": _Own(24, (Stage(share=0.75, points=512), Stage(share=0.125, points=1024)), 16, 4e-3),
-    "point2sequence": _Own(10, (Stage(share=0.8, points=4096, centres=0.25),)),
+# Chosen on the validation samples of fold 0 of `ogurob` (docs/adr/0005). The time of PointNet++ and Point2Sequence
+# grows with the centres, that of the other networks with the points.
+_NETWORK_SETTINGS = {
+    "pointnet": _NetworkSettings(
+        45, (CoarseStage(share=0.667, points=512), CoarseStage(share=0.267, points=1024)), 32, 3e-3
+    ),
+    "pointnet2": _NetworkSettings(8, (CoarseStage(share=0.75, points=1024, centres=0.5),)),
+    "dgcnn": _NetworkSettings(
+        18, (CoarseStage(share=0.72, points=256), CoarseStage(share=0.22, points=1024)), 32, 3e-3
+    ),
+    "pointcnn": _NetworkSettings(
+        24, (CoarseStage(share=0.75, points=512), CoarseStage(share=0.125, points=1024)), 16, 4e-3
+    ),
+    "point2sequence": _NetworkSettings(10, (CoarseStage(share=0.8, points=4096, centres=0.25),)),
 }
 
 _TENSORFLOW = {
@@ -103,7 +100,7 @@ _TENSORFLOW = {
     "min_learning_rate": 1e-5,
     "weight_decay": 0.0,
     "schedule": "steps",
-    # "Every 200,000 samples" was every 20 epochs of the authors' 9,840 shapes.
+    # The authors' "every 200,000 samples" is every 20 epochs of their 9,840 shapes.
     "step_factor": 0.7,
     "step_epochs": 20,
     "label_smoothing": 0.0,
@@ -113,9 +110,9 @@ _TENSORFLOW = {
     "precision": "fp32",
 }
 _FULL_TURN = 180.0
-_JITTER = 0.01  # cut at 0.05, which is the default
+_JITTER = 0.01  # clipped at 0.05, the default of Augmentation
 
-# Deviation: the originals turn about y, their up axis; ours is z.
+# Deviation: the originals rotate about y, their vertical axis; the vertical axis is z here.
 AUTHORS: dict[str, Recipe] = {
     "pointnet": Recipe.model_validate(
         _TENSORFLOW
@@ -126,7 +123,7 @@ AUTHORS: dict[str, Recipe] = {
             "augmentation": Augmentation(yaw_deg=_FULL_TURN, jitter=_JITTER),
         }
     ),
-    # Deviation: points are not shuffled; a farthest-point order is what the prefix centres need.
+    # Deviation: points are not shuffled, because centres are the first points of a farthest-point order.
     "pointnet2": Recipe.model_validate(
         _TENSORFLOW
         | {
@@ -138,8 +135,8 @@ AUTHORS: dict[str, Recipe] = {
             ),
         }
     ),
-    # Deviation: x and y are scaled alike (clouds.augment says why), z on its own. A smoothing of 0.2 over the other
-    # classes is 0.3 in torch's formula, which smooths over all three.
+    # Deviation: x and y share one scale (see clouds.augmentation), z has another. The authors spread 0.2 over the other
+    # classes, which is 0.3 in torch's formula, because that spreads over all three.
     "dgcnn": Recipe(
         name="authors-dgcnn",
         epochs=250,
@@ -154,8 +151,9 @@ AUTHORS: dict[str, Recipe] = {
         augmentation=Augmentation(scale=(2 / 3, 3 / 2), scale_z=(2 / 3, 3 / 2), shift=0.2),
         precision="fp32",
     ),
-    # Deviation: the turn is a turn (the original multiplies scale and rotation element by element); scale U(0.7, 1.3)
-    # for N(1, 0.1) cut at 3 sigma, x and y alike; torch's epsilon acts after bias correction, TensorFlow's before.
+    # Deviation: a proper rotation (the original multiplies scale and rotation element by element); scale U(0.7, 1.3)
+    # in place of N(1, 0.1) clipped at 3 sigma, one scale for x and y; torch adds epsilon after bias correction,
+    # TensorFlow before.
     "pointcnn": Recipe(
         name="authors-pointcnn",
         epochs=1024,
@@ -183,79 +181,20 @@ AUTHORS: dict[str, Recipe] = {
 
 
 def find_recipe(name: str, network: str) -> Recipe:
-    """The recipe called `common` or `authors` for a network.
+    """Return the recipe of a network.
+
+    Args:
+        name: "common" or "authors".
+        network: its name; "common" has defaults for networks without settings of their own.
 
     Raises:
-        ConfigError: no such recipe.
+        ConfigError: there is no such recipe.
     """
     if name == "common":
-        if network not in _OWN:
-            return COMMON
-        own = _OWN[network]._asdict()
-        return COMMON.model_copy(update={"coarse_to_fine": own.pop("stages"), **own})
+        settings = _NETWORK_SETTINGS.get(network)
+        return COMMON if settings is None else COMMON.model_copy(update=settings._asdict())
     if name == "authors" and network in AUTHORS:
         return AUTHORS[network]
-    raise ConfigError(f"no recipe {name!r} for {network}: choose common or authors")
-
-
-def learning_rate(
-    recipe: Recipe, iteration: int, iterations_per_epoch: int, num_points: int = NUM_POINTS
-) -> float:
-    """Rate of an iteration, counted from 0 over the whole training, which ends with `num_points` a cloud."""
-    high, low = recipe.learning_rate, recipe.min_learning_rate
-    if recipe.schedule == "cosine":
-        # As the authors stepped it, once an epoch: the first epoch has the full rate, the last but one step the lowest.
-        progress = (iteration // iterations_per_epoch) / recipe.epochs
-        return low + (high - low) * (1 + math.cos(math.pi * progress)) / 2
-    if recipe.schedule == "steps":
-        return max(low, high * recipe.step_factor ** _steps(recipe, iteration, iterations_per_epoch))
-    # One cycle (Smith & Topin 2018): a cosine rise from a 25th, then a cosine fall to nearly nothing.
-    progress = _progress(recipe, iteration / iterations_per_epoch, num_points)
-    rise = max(recipe.warmup, 1 / (recipe.epochs * iterations_per_epoch))
-    if progress < rise:
-        return high * (1 / 25 + (1 - 1 / 25) * (1 - math.cos(math.pi * progress / rise)) / 2)
-    fall = (progress - rise) / max(1e-9, 1 - rise)
-    floor = max(low, high * 1e-4)
-    return floor + (high - floor) * (1 + math.cos(math.pi * min(1.0, fall))) / 2
-
-
-def _progress(recipe: Recipe, epochs: float, num_points: int) -> float:
-    """Share of the training after so many epochs.
-
-    An epoch counts as the root of what it looks at: few fine epochs after many coarse ones then still find a rate
-    they can learn with, and the rate falls to nothing at the resolution that counts.
-    """
-    seen = [resolution_of_epoch(recipe, epoch, num_points) for epoch in range(recipe.epochs)]
-    roots = [math.sqrt(points * centres) for points, centres in seen]
-    whole = int(epochs)
-    return (sum(roots[:whole]) + (epochs - whole) * roots[min(whole, recipe.epochs - 1)]) / sum(roots)
-
-
-def batchnorm_momentum(recipe: Recipe, iteration: int, iterations_per_epoch: int) -> float | None:
-    """Weight of the newest batch in the running statistics, halved with every step; None leaves torch's."""
-    if recipe.batchnorm_momentum is None:
-        return None
-    first, last = recipe.batchnorm_momentum
-    return max(last, first * 0.5 ** _steps(recipe, iteration, iterations_per_epoch))
-
-
-def _steps(recipe: Recipe, iteration: int, iterations_per_epoch: int) -> int:
-    return iteration // (recipe.step_iterations or recipe.step_epochs * iterations_per_epoch)
-
-
-def resolution_of_epoch(recipe: Recipe, epoch: int, num_points: int) -> Resolution:
-    """How much of each cloud an epoch (from 0) looks at; the last one always at everything.
-
-    Raises:
-        ConfigError: the shares of the stages leave nothing for all points.
-    """
-    end = 0.0
-    for stage in recipe.coarse_to_fine:
-        end += stage.share
-        if epoch < min(round(end * recipe.epochs), recipe.epochs - 1):
-            return Resolution(min(stage.points, num_points), stage.centres)
-    if end >= 1:
-        raise ConfigError(
-            f"recipe {recipe.name}: coarse-to-fine shares add up to {end}: leave some for all points"
-        )
-    return Resolution(num_points, 1.0)
+    raise ConfigError(
+        f"no recipe {name!r} for network {network}", field="recipe", expected=" or ".join(RECIPES)
+    )

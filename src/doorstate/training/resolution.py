@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How many points does a network need: finished weights tested on fewer points, as they are and trained on a little."""
+"""Resolution study: accuracy of finished weights on fewer points, with and without fine-tuning."""
 
 from __future__ import annotations
 
@@ -9,40 +9,40 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from doorstate._models import FrozenModel
 from doorstate.clouds.preparation import MIN_POINTS
-from doorstate.networks import list_networks
-from doorstate.training.comparison import Experiment, read_study
+from doorstate.training.experiment import Experiment
 from doorstate.training.run_folder import AS_TRAINED, FINE_TUNED
+from doorstate.training.study import Study, StudyPart
 
 
-class ResolutionStudy(FrozenModel):
-    """One flat study file: which weights, on how many points."""
+class ResolutionStudy(Study):
+    """Weights of one comparison, tested on several numbers of points."""
 
-    name: str
     dataset: str
-    start_from: str  # a finished comparison
+    start_from: str  # folder of a finished comparison
     protocol: str = "paper"
-    networks: tuple[str, ...] = Field(default_factory=lambda: tuple(list_networks()))
     folds: int = Field(default=1, ge=1)
     points: tuple[Annotated[int, Field(ge=MIN_POINTS)], ...] = Field(min_length=1)
     seed: int = 0
     heads: tuple[str, ...] = ()  # those of the weights
-    fine_tuning: dict[str, Any] | None = None  # fields of the common recipe; without it nothing is trained
+    fine_tuning: dict[str, Any] | None = None  # fields of the common recipe; None: no fine-tuning
 
-    def experiments(self) -> Iterator[tuple[str, Experiment]]:
-        """Name and content of the comparisons that the study is made of, the coarsest first.
+    def parts(self) -> Iterator[StudyPart]:
+        """Yield the comparisons, fewest points first.
 
-        Weights are not fine-tuned on as many points as they were trained on: that is what they were trained for.
+        The largest number of points is not fine-tuned: the weights were trained on it.
+
+        Raises:
+            ConfigError: a field has a wrong value.
         """
         for points in sorted(self.points):
-            yield self._experiment(AS_TRAINED, points, {"epochs": 0})
+            yield self._part(AS_TRAINED, points, {"epochs": 0})
             if self.fine_tuning is not None and points < max(self.points):
-                yield self._experiment(FINE_TUNED, points, self.fine_tuning)
+                yield self._part(FINE_TUNED, points, self.fine_tuning)
 
-    def _experiment(self, kind: str, points: int, changes: dict[str, Any]) -> tuple[str, Experiment]:
+    def _part(self, kind: str, points: int, recipe_changes: dict[str, Any]) -> StudyPart:
         name = f"{kind}-{points}"
-        return name, Experiment(
+        experiment = Experiment(
             name=name,
             dataset=self.dataset,
             protocol=self.protocol,
@@ -50,19 +50,9 @@ class ResolutionStudy(FrozenModel):
             folds=self.folds,
             num_points=points,
             seed=self.seed,
-            recipe_changes=changes,
+            recipe_changes=recipe_changes,
             start_from=self.start_from,
             heads=self.heads,
         )
-
-
-def load_study(path: Path) -> ResolutionStudy:
-    """Read a study file.
-
-    Raises:
-        ConfigError: missing, no TOML, or an unknown or wrong value.
-    """
-    study = read_study(path, ResolutionStudy)
-    for _, experiment in study.experiments():
         experiment.check()
-    return study
+        return StudyPart(Path(name), experiment)

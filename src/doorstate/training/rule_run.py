@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One run of a rule: nothing is trained, the test samples of one fold are answered."""
+"""One run of a rule: the test samples of one fold; nothing is trained."""
 
 from __future__ import annotations
 
 import json
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -23,12 +23,12 @@ from doorstate.training.environment import describe_environment
 from doorstate.training.run_folder import RunFolder
 from doorstate.types import ABSTAINED, NO_DOOR, STATES
 
-_TELL_EVERY_S = 1.0
+_POSITION_INTERVAL_S = 1.0
 _OPEN_OR_NOT = ("not_open", "open")
 
 
 class RuleRunConfig(FrozenModel):
-    """What a run answers with; kept in its folder, and a folder is continued only with the same."""
+    """Configuration of a run, stored in its folder; a folder is continued only with the same configuration."""
 
     rule: str
     parameters: dict[str, Any]
@@ -37,56 +37,58 @@ class RuleRunConfig(FrozenModel):
     fold: int
 
 
-def answer(
+def run_rule(
     config: RuleRunConfig, dataset: PreparedDataset, roles: Mapping[str, Role], folder: Path
 ) -> dict[str, Any]:
-    """RuleResult the test samples of a fold from their raw clouds; a finished run is returned as it is.
+    """Apply a rule to the raw clouds of the test samples with a door; a finished run is returned.
 
-    Predictions have more columns than a network's: reason, opening_angle_deg, opening_width_m, open_or_not. What was
-    found where the answer is not right is kept in `detections.jsonl`, for the report to draw.
+    Predictions have more columns than those of a network: reason, opening_angle_deg, opening_width_m, open_or_not.
+    Detections in the samples that the rule got wrong are kept in `detections.jsonl`, for the report.
+
+    Args:
+        config: the run.
+        dataset: its data set.
+        roles: {sample_id: role} of the fold.
+        folder: of the run.
+
+    Returns:
+        Metrics as in `metrics.json`.
 
     Raises:
-        DatasetError: no sample is tested.
-        RunError: the folder belongs to another run.
+        DatasetError: there is no test sample with a door.
+        RunError: the folder holds another run.
     """
     run = RunFolder(folder)
     run.claim(config.model_dump(mode="json"), describe_environment())
     if run.finished:
         return run.read_metrics()
-    tested = [
-        sample
-        for sample, role in roles.items()
-        if role == "test" and dataset.rows[dataset.index_of(sample)]["state"] != NO_DOOR
-    ]
-    if not tested:
-        raise DatasetError(f"no sample with a door is tested in fold {config.fold}")
+    samples = _test_samples(dataset, roles)
+    if not samples:
+        raise DatasetError(f"no test sample with a door in fold {config.fold}", path=dataset.folder)
     rule = create_rule(config.rule)
-    started = told = time.perf_counter()
-    rows, found, milliseconds = [], [], []
-    for done, sample in enumerate(tested):
+    started = position_s = time.perf_counter()
+    rows, detections, milliseconds = [], [], []
+    for number, sample in enumerate(samples, start=1):
         index = dataset.index_of(sample)
         cloud = dataset.raw_cloud(index)
-        before = time.perf_counter()
-        given = rule(cloud)
-        milliseconds.append(1000 * (time.perf_counter() - before))
-        rows.append(_row(sample, dataset.rows[index]["state"], given))
-        if rows[-1]["state"] != rows[-1]["predicted"]:
-            shapes = [[shape.name, np.round(shape.points_m, 3).tolist()] for shape in given.detections]
-            found.append(json.dumps({"sample_id": sample, "detections": shapes}))
-        if time.perf_counter() - told > _TELL_EVERY_S:
-            told = time.perf_counter()
-            run.write_position((done + 1) / len(tested))
+        rule_started = time.perf_counter()
+        result = rule(cloud)
+        milliseconds.append(1000 * (time.perf_counter() - rule_started))
+        row = _prediction_row(sample, dataset.rows[index]["state"], result)
+        rows.append(row)
+        if row["state"] != row["predicted"]:
+            detections.append(_detections_line(sample, result))
+        if time.perf_counter() - position_s > _POSITION_INTERVAL_S:
+            position_s = time.perf_counter()
+            run.write_position(number / len(samples))
     write_csv(run.predictions, rows)
-    write_text(run.detections, "".join(line + "\n" for line in found))
-    true, said = [row["state"] for row in rows], [row["predicted"] for row in rows]
+    write_text(run.detections, "".join(line + "\n" for line in detections))
     metrics = {
         "method": config.rule,
         "fold": config.fold,
         "seconds": time.perf_counter() - started,
-        "test_samples": len(tested),
-        "test_macro_f1": float(f1_score(true, said, labels=STATES, average="macro", zero_division=0)),
-        "test_accuracy": float(accuracy_score(true, said)),
-        "abstained": said.count(ABSTAINED),
+        "test_samples": len(samples),
+        **_scores(rows),
         "median_ms": float(np.median(milliseconds)),
         "p95_ms": float(np.quantile(milliseconds, 0.95)),
     }
@@ -94,18 +96,42 @@ def answer(
     return metrics
 
 
-def _row(sample: str, state: str, answer: RuleResult) -> dict[str, str]:
-    said = ABSTAINED if answer.state is None else answer.state.label
+def _test_samples(dataset: PreparedDataset, roles: Mapping[str, Role]) -> list[str]:
+    return [
+        sample
+        for sample, role in roles.items()
+        if role == "test" and dataset.rows[dataset.index_of(sample)]["state"] != NO_DOOR
+    ]
+
+
+def _scores(rows: Sequence[Mapping[str, str]]) -> dict[str, float]:
+    true, predicted = [row["state"] for row in rows], [row["predicted"] for row in rows]
+    return {
+        "test_macro_f1": float(f1_score(true, predicted, labels=STATES, average="macro", zero_division=0)),
+        "test_accuracy": float(accuracy_score(true, predicted)),
+        "abstained": predicted.count(ABSTAINED),
+    }
+
+
+def _prediction_row(sample: str, state: str, result: RuleResult) -> dict[str, str]:
+    predicted = ABSTAINED if result.state is None else result.state.label
     return {
         "sample_id": sample,
         "state": state,
-        "predicted": said,
-        **{f"p_{name}": "1" if name == said else "0" for name in STATES},
-        "reason": answer.reason,
-        "opening_angle_deg": _number(answer.opening_angle_deg),
-        "opening_width_m": _number(answer.opening_width_m),
-        "open_or_not": "" if answer.open_or_not is None else _OPEN_OR_NOT[answer.open_or_not],
+        "predicted": predicted,
+        **{f"p_{name}": "1" if name == predicted else "0" for name in STATES},
+        "reason": result.reason,
+        "opening_angle_deg": _number(result.opening_angle_deg),
+        "opening_width_m": _number(result.opening_width_m),
+        "open_or_not": "" if result.open_or_not is None else _OPEN_OR_NOT[result.open_or_not],
     }
+
+
+def _detections_line(sample: str, result: RuleResult) -> str:
+    detections = [
+        [detection.name, np.round(detection.points_m, 3).tolist()] for detection in result.detections
+    ]
+    return json.dumps({"sample_id": sample, "detections": detections})
 
 
 def _number(value: float | None) -> str:

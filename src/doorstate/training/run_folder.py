@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The files of one run: config, environment, log, checkpoint, weights, predictions, and metrics last of all."""
+"""Files of one run. `metrics.json` is written last and marks a finished run."""
 
 from __future__ import annotations
 
@@ -14,19 +14,14 @@ from doorstate._files import read_csv, write_csv, write_text
 from doorstate.errors import RunError
 from doorstate.types import STATES
 
-AS_TRAINED, FINE_TUNED = "as-trained", "fine-tuned"  # parts of a resolution study: folders AS_TRAINED-POINTS
-
-_SINCE: dict[str, Any] = {
-    "heads": [],
-    "rules": [],
-    "extra_train_datasets": [],
-}  # of settings: what older folders do not know
+AS_TRAINED, FINE_TUNED = "as-trained", "fine-tuned"  # comparisons of a resolution study are named KIND-POINTS
 
 
 class RunFolder:
-    """One run on disk; it is finished once `metrics.json` is there."""
+    """Paths of the files of one run, and functions to read and write the small ones."""
 
     def __init__(self, path: Path) -> None:
+        """Name the files; nothing is read or made."""
         self.path = path
         self.config = path / "config.json"
         self.environment = path / "environment.json"
@@ -35,78 +30,92 @@ class RunFolder:
         self.checkpoint = path / "checkpoint.pt"
         self.weights = path / "weights.safetensors"
         self.predictions = path / "predictions.csv"
-        self.validation = path / "validation.csv"  # the same of the samples that the epoch was chosen on
+        self.validation = path / "validation.csv"  # predictions for the samples that the epoch was chosen on
         self.head_outputs = path / "head_outputs.csv"  # of further heads, for all test samples
         self.detections = path / "detections.jsonl"  # of a rule, for the test samples that it got wrong
         self.metrics = path / "metrics.json"
 
     @property
     def finished(self) -> bool:
-        """Whether the run has been tested, so that nothing is left to do."""
+        """True once the run has been tested."""
         return self.metrics.is_file()
 
     def claim(self, config: Mapping[str, Any], environment: Mapping[str, Any]) -> None:
-        """Begin the run, or make sure that the folder holds this very run.
+        """Start the run, or check that the folder holds the same run.
 
         Raises:
             RunError: the folder holds another run.
         """
         if self.config.is_file():
-            check_same(self.config, config, "a run")
+            check_same_settings(self.config, config)
         else:
             write_json(self.config, config)
         if not self.finished:
             write_json(self.environment, environment)
 
     def write_position(self, epochs: float) -> None:
-        """Say how far the training is, in epochs; for whoever watches, nothing depends on it."""
+        """Write the position of the training, in epochs, for progress displays."""
         write_text(self.position, f"{epochs:.3f}\n")
 
     def read_position(self) -> float:
-        """How far the training is, in epochs; 0 if nobody knows."""
+        """Return the position of the training, in epochs; 0 before it is written."""
         try:
             return float(self.position.read_text(encoding="utf-8"))
         except (OSError, ValueError):
             return 0.0
 
     def read_metrics(self) -> dict[str, Any]:
-        """Metrics of a finished run."""
+        """Return the metrics of a finished run.
+
+        Raises:
+            RunError: the run is not finished.
+        """
         return read_json(self.metrics)
 
-    def write_log(self, lines: Sequence[Mapping[str, float]]) -> None:
+    def write_log(self, entries: Sequence[Mapping[str, float]]) -> None:
         """Write one line per epoch."""
-        write_csv(self.log, [{key: f"{value:.6g}" for key, value in line.items()} for line in lines])
+        write_csv(self.log, [{key: f"{value:.6g}" for key, value in entry.items()} for entry in entries])
 
     def read_log(self) -> list[dict[str, str]]:
-        """One line per epoch done so far."""
+        """Return one entry per finished epoch."""
         return read_csv(self.log) if self.log.is_file() else []
 
     def finish(self, metrics: Mapping[str, Any]) -> None:
-        """Write the metrics, and drop what only a running training needs."""
+        """Write the metrics and delete the files that only an unfinished run needs."""
         write_json(self.metrics, metrics)
         self.checkpoint.unlink(missing_ok=True)
         self.position.unlink(missing_ok=True)
 
 
-def run_of(folder: Path, network: str, fold: int) -> RunFolder:
-    """Where the run of a network or rule on one fold lies in a comparison's folder."""
-    return RunFolder(folder / "runs" / network / f"fold{fold}")
+def run_of(folder: Path, method: str, fold: int) -> RunFolder:
+    """Return the run of a network or rule on one fold in the folder of a comparison."""
+    return RunFolder(folder / "runs" / method / f"fold{fold}")
 
 
-def check_same(path: Path, settings: Mapping[str, Any], what: str) -> None:
-    """Raise RunError unless a folder's file holds these settings, or those of an older version that mean the same."""
-    found = {key: value for key, value in _SINCE.items() if key in settings} | read_json(path)
-    changed = sorted(key for key in {*found, *settings} if found.get(key) != settings.get(key))
+def check_same_settings(path: Path, settings: Mapping[str, Any]) -> None:
+    """Raise RunError unless a JSON file holds these settings."""
+    stored = read_json(path)
+    changed = sorted(key for key in {*stored, *settings} if stored.get(key) != settings.get(key))
     if changed:
         raise RunError(
-            f"{path.parent}: holds {what} with another {', '.join(changed)}; choose another folder"
+            f"the folder was made with another {', '.join(changed)}",
+            path=path.parent,
+            field=changed[0],
+            hint="choose another folder",
         )
 
 
 def write_predictions(
     path: Path, samples: Sequence[str], labels: np.ndarray, probabilities: np.ndarray
 ) -> None:
-    """Write states and probabilities (M, 3), small ones too: temperature scaling needs their logarithms."""
+    """Write states and probabilities.
+
+    Args:
+        path: a CSV file.
+        samples: names of M samples.
+        labels: (M,) true states.
+        probabilities: (M, 3); five digits, because temperature scaling takes logarithms of small ones.
+    """
     write_csv(
         path,
         [
@@ -134,7 +143,7 @@ def write_head_outputs(path: Path, samples: Sequence[str], columns: Mapping[str,
 
 
 def read_json(path: Path) -> dict[str, Any]:
-    """Read a JSON object.
+    """Return the JSON object of a file.
 
     Raises:
         RunError: the file is missing or damaged.
@@ -142,9 +151,9 @@ def read_json(path: Path) -> dict[str, Any]:
     try:
         value = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
-        raise RunError(f"{path}: cannot be read ({error})") from error
+        raise RunError(f"cannot be read ({error})", path=path) from error
     if not isinstance(value, dict):
-        raise RunError(f"{path}: holds no JSON object")
+        raise RunError("holds no JSON object", path=path)
     return value
 
 

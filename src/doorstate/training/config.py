@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Configuration of one run: one network trained on one fold."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from pydantic import Field
+
+from doorstate._models import FrozenModel
+from doorstate.training.recipes import Recipe
+
+
+class RunConfig(FrozenModel):
+    """Configuration of a run, stored in its folder; a folder is continued only with the same configuration."""
+
+    network: str
+    network_options: dict[str, Any] = Field(default_factory=dict)
+    dataset: str
+    protocol: str
+    fold: int
+    num_points: int
+    seed: int
+    recipe: Recipe
+    start_from: str | None = None  # weights file to start from
+    heads: tuple[str, ...] = ()  # heads besides the state (networks.heads)
+    extra_train_datasets: tuple[str, ...] = ()  # all samples of these are trained on in addition to the fold
+
+    @property
+    def all_network_options(self) -> dict[str, Any]:
+        """Options of the network, including those that the recipe sets."""
+        eps = self.recipe.batchnorm_eps
+        return self.network_options | ({} if eps is None else {"batchnorm_eps": eps})
+
+    def torch_seed(self, stage: int) -> int:
+        """Seed of torch for a stage: 0 for the initial weights, `epoch + 1` for an epoch."""
+        return int(np.random.SeedSequence([self.seed, self.fold, stage]).generate_state(1)[0])

@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Samples of one run by their role, and the loaders of an epoch."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+from doorstate.dataset.loader import CloudLoader, FindNeighbours
+from doorstate.dataset.splits import Role
+from doorstate.dataset.store import PreparedDataset
+from doorstate.errors import DatasetError
+from doorstate.types import NO_DOOR
+
+_ROLES: tuple[Role, ...] = ("train", "val", "test")
+_MIN_SAMPLES = 2  # of each role
+
+
+class EpochLoaders(NamedTuple):
+    """Loaders of the training and of the validation samples at one resolution."""
+
+    train: CloudLoader
+    val: CloudLoader
+
+
+class RunData:
+    """Samples of one fold by role, and data sets that are trained on in addition."""
+
+    def __init__(
+        self,
+        dataset: PreparedDataset,
+        roles: Mapping[str, Role],
+        heads: Sequence[str],
+        extra_datasets: Sequence[PreparedDataset] = (),
+    ) -> None:
+        """Sort the samples.
+
+        Args:
+            dataset: of the fold.
+            roles: {sample_id: role}.
+            heads: whose targets the loaders give.
+            extra_datasets: all of their samples are trained on.
+
+        Raises:
+            DatasetError: a role has too few samples, or none with a door.
+        """
+        self.dataset, self.heads, self.extra_datasets = dataset, heads, extra_datasets
+        self.samples: dict[Role, list[str]] = {
+            role: [sample for sample, sample_role in roles.items() if sample_role == role] for role in _ROLES
+        }
+        self._check_roles()
+
+    @property
+    def num_extra(self) -> int:
+        """Number of samples of the additional data sets."""
+        return sum(len(dataset) for dataset in self.extra_datasets)
+
+    @property
+    def num_train(self) -> int:
+        """Number of training samples, additional ones included."""
+        return len(self.samples["train"]) + self.num_extra
+
+    def loader(self, role: Role, num_points: int) -> CloudLoader:
+        """Return a loader of the fold's samples of one role, without neighbourhoods."""
+        return CloudLoader(self.dataset, self.samples[role], num_points, heads=self.heads)
+
+    def epoch_loaders(
+        self, num_points: int, find_neighbours: FindNeighbours, keep_train_neighbours: bool
+    ) -> EpochLoaders:
+        """Return the loaders of an epoch.
+
+        Args:
+            num_points: of each cloud.
+            find_neighbours: the network's search, done once per validation cloud.
+            keep_train_neighbours: do it once per training cloud too.
+        """
+        train = CloudLoader(
+            self.dataset,
+            self.samples["train"],
+            num_points,
+            find_neighbours if keep_train_neighbours else None,
+            self.heads,
+            self.extra_datasets,
+        )
+        val = CloudLoader(self.dataset, self.samples["val"], num_points, find_neighbours, self.heads)
+        return EpochLoaders(train, val)
+
+    def _check_roles(self) -> None:
+        present = [role for role in _ROLES if self.samples[role]]
+        # All samples are trained on (weights for use) or tested (finished weights); otherwise all roles are needed.
+        required = present if present in (["train"], ["test"]) else _ROLES
+        for role in required:
+            samples, folder = self.samples[role], self.dataset.folder
+            if len(samples) < _MIN_SAMPLES:
+                raise DatasetError(
+                    f"{len(samples)} samples for {role}: the data set is too small for this split",
+                    path=folder,
+                )
+            if all(self.dataset.rows[self.dataset.index_of(name)]["state"] == NO_DOOR for name in samples):
+                raise DatasetError(
+                    f"no sample with a door for {role}: the data set is too small for this split", path=folder
+                )

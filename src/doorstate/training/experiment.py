@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Experiment files: the methods, data, folds and recipe of one comparison."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import Field, ValidationError
+
+from doorstate._models import FrozenModel
+from doorstate.clouds.preparation import MIN_POINTS, NUM_POINTS
+from doorstate.dataset.splits import NUM_FOLDS, ONE_FOLD, PROTOCOLS, UNSEEN
+from doorstate.errors import ConfigError, first_validation_error
+from doorstate.networks import create_network, list_networks, network_class
+from doorstate.networks.head_layers import add_heads
+from doorstate.networks.heads import STATE
+from doorstate.rules import create_rule
+from doorstate.training.recipes import Recipe, find_recipe
+from doorstate.types import PARTS
+
+
+class Experiment(FrozenModel):
+    """Configuration of one comparison: one flat TOML file."""
+
+    name: str
+    dataset: str
+    protocol: str = "paper"
+    networks: tuple[str, ...] = Field(default_factory=lambda: tuple(list_networks()))
+    rules: tuple[str, ...] = ()  # tested on the same samples; nothing is trained
+    folds: int = Field(default=NUM_FOLDS, ge=1, le=NUM_FOLDS)  # number of folds to run
+    num_points: int = Field(default=NUM_POINTS, ge=MIN_POINTS)
+    seed: int = 0
+    recipe: str = "common"
+    recipe_changes: dict[str, Any] = Field(default_factory=dict)  # fields of the recipe
+    network_changes: dict[str, dict[str, Any]] = Field(
+        default_factory=dict
+    )  # by network, over recipe_changes
+    # Folder of a comparison: runs start from its weights of the same network and fold. Networks that it does not have
+    # start from random weights.
+    start_from: str | None = None
+    heads: tuple[str, ...] = ()  # heads besides the state, trained jointly
+    extra_train_datasets: tuple[str, ...] = ()  # all samples are trained on in every fold, and never tested
+
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """Networks and rules."""
+        return self.networks + self.rules
+
+    def recipe_of(self, network: str) -> Recipe:
+        """Return the recipe of a network with all changes.
+
+        Raises:
+            ConfigError: there is no such recipe, or a change does not fit it.
+        """
+        recipe = find_recipe(self.recipe, network)
+        changes = self.recipe_changes | self.network_changes.get(network, {})
+        try:
+            return Recipe.model_validate(recipe.model_dump() | changes)
+        except ValidationError as error:
+            raise self._error("recipe_changes", first_validation_error(error, Recipe.model_fields)) from error
+
+    def heads_of(self, network: str) -> tuple[str, ...]:
+        """Return the heads of a network: "parts" only if it has features of single points."""
+        has_points = network_class(network).has_point_features
+        return tuple(name for name in self.heads if has_points or name != PARTS)
+
+    def check(self) -> None:
+        """Check all names before anything is trained.
+
+        Raises:
+            ConfigError: a name does not exist, or two fields do not fit each other.
+        """
+        if self.protocol not in PROTOCOLS:
+            raise self._error("protocol", f"no protocol {self.protocol!r}", " or ".join(PROTOCOLS))
+        if self.protocol in ONE_FOLD and self.folds != 1:
+            raise self._error("folds", f"protocol {self.protocol} has one fold", "1")
+        for name in self.network_changes:
+            network_class(name)
+        for network in self.networks:
+            self._check_network(network)
+        for rule in self.rules:
+            create_rule(rule)
+
+    def _check_network(self, network: str) -> None:
+        recipe = self.recipe_of(network)
+        add_heads(create_network(network), self.heads_of(network))
+        if recipe.epochs and self.protocol == UNSEEN:
+            raise self._error("recipe_changes.epochs", f"protocol {UNSEEN} trains nothing", "0")
+        heads = (STATE, *self.heads)
+        for name in recipe.loss_weights:
+            if name not in heads:
+                raise self._error("loss_weights", f"{network} has no head {name!r}", " or ".join(heads))
+
+    def _error(self, field: str, message: str, expected: str | None = None) -> ConfigError:
+        return ConfigError(f"experiment {self.name}: {message}", field=field, expected=expected)
+
+
+def load_experiment(path: Path | None, overrides: Mapping[str, Any]) -> Experiment:
+    """Return an experiment from a file and overrides, which win over the file.
+
+    Args:
+        path: TOML file; None if the overrides are complete.
+        overrides: fields by name; `recipe_changes` are merged with those of the file and also win over
+            `network_changes`.
+
+    Raises:
+        ConfigError: the file cannot be read, or a field is unknown or has a wrong value.
+    """
+    values: dict[str, Any] = {}
+    if path is not None:
+        values = {"name": path.stem} | read_toml(path)
+    fields = dict(overrides)
+    changes = fields.pop("recipe_changes", {})
+    try:
+        experiment = Experiment.model_validate(values | fields)
+    except ValidationError as error:
+        raise ConfigError(first_validation_error(error, Experiment.model_fields), path=path) from error
+    experiment = experiment.model_copy(
+        update={
+            "recipe_changes": experiment.recipe_changes | changes,
+            "network_changes": {
+                network: network_changes | changes
+                for network, network_changes in experiment.network_changes.items()
+            },
+        }
+    )
+    experiment.check()
+    return experiment
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """Return the content of a TOML file.
+
+    Raises:
+        ConfigError: it cannot be read.
+    """
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise ConfigError(f"cannot be read as TOML ({error})", path=path) from error

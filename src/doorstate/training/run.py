@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One run: train one network on one fold in one folder, and test it."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import lightning_fabric
+import torch
+
+from doorstate._memory import keep_freed_memory
+from doorstate.dataset.splits import Role
+from doorstate.dataset.store import PreparedDataset
+from doorstate.errors import ConfigError, WeightsError
+from doorstate.networks import create_network
+from doorstate.networks.base import PointNetwork
+from doorstate.networks.head_layers import add_heads
+from doorstate.networks.heads import head_columns
+from doorstate.networks.weights import load_into, read_card, save_weights
+from doorstate.training.checkpoint import TrainingState
+from doorstate.training.config import RunConfig
+from doorstate.training.data import RunData
+from doorstate.training.environment import describe_environment, has_fast_bf16
+from doorstate.training.evaluation import evaluate
+from doorstate.training.recipes import Recipe
+from doorstate.training.run_folder import RunFolder, write_head_outputs, write_predictions
+from doorstate.training.trainer import Trainer
+
+
+def train_run(
+    config: RunConfig,
+    dataset: PreparedDataset,
+    roles: Mapping[str, Role],
+    folder: Path,
+    extra_datasets: Sequence[PreparedDataset] = (),
+) -> dict[str, Any]:
+    """Train, choose the epoch on the validation samples, and evaluate the test samples once.
+
+    Args:
+        config: the run.
+        dataset: its data set.
+        roles: {sample_id: role} of the fold. Without validation and test samples the last epoch is kept and nothing is
+            tested, which makes weights for use.
+        folder: of the run; a finished run is returned, an unfinished one continued.
+        extra_datasets: those of `config.extra_train_datasets`.
+
+    Returns:
+        Metrics as in `metrics.json`.
+
+    Raises:
+        ConfigError: there are no epochs and no weights to start from.
+        RunError: the folder holds another run, or the loss is not finite.
+        DatasetError: a role has too few samples.
+        WeightsError: the weights to start from are missing or do not fit.
+    """
+    if config.recipe.epochs == 0 and config.start_from is None:
+        raise ConfigError(
+            "a run of 0 epochs needs weights to start from", field="epochs", expected="1 or more"
+        )
+    run = RunFolder(folder)
+    run.claim(config.model_dump(mode="json"), describe_environment())
+    if run.finished:
+        return run.read_metrics()
+    data = RunData(dataset, roles, config.heads, extra_datasets)
+    keep_freed_memory()
+    fabric = create_fabric(config.recipe)
+    with torch.random.fork_rng():
+        torch.manual_seed(config.torch_seed(0))
+        network = build_network(config)
+        if config.recipe.epochs == 0:
+            save_weights(run.weights, network, read_card(Path(str(config.start_from))))
+            state = TrainingState()
+        else:
+            state = Trainer(config, fabric, network, data, run).train()
+        metrics = evaluate_run(config, fabric, network, data, run, state)
+    run.finish(metrics)
+    return metrics
+
+
+def build_network(config: RunConfig) -> PointNetwork:
+    """Return the network of a run with its initial weights.
+
+    Raises:
+        WeightsError: the weights to start from are missing or do not fit.
+    """
+    network = create_network(config.network, **config.all_network_options)
+    add_heads(network, config.heads)
+    if config.start_from is not None:
+        path = Path(config.start_from)
+        card = read_card(path)
+        if (card.network, card.network_options) != (config.network, config.all_network_options):
+            raise WeightsError(
+                f"made for {card.network} {card.network_options or ''}".rstrip(),
+                path=path,
+                expected=config.network,
+            )
+        if card.heads != config.heads:
+            raise WeightsError(
+                f"has the heads {', '.join(card.heads) or 'none'}",
+                path=path,
+                expected=", ".join(config.heads) or "no heads",
+            )
+        load_into(network, path)
+    return network
+
+
+def evaluate_run(
+    config: RunConfig,
+    fabric: lightning_fabric.Fabric,
+    network: PointNetwork,
+    data: RunData,
+    run: RunFolder,
+    state: TrainingState,
+) -> dict[str, Any]:
+    """Write the predictions of the best weights for validation and test samples; return the metrics."""
+    load_into(network, run.weights)
+    network.to(fabric.device)
+    metrics: dict[str, Any] = {
+        "method": config.network,
+        "fold": config.fold,
+        "best_epoch": state.best_epoch,
+        "seconds": sum(entry["seconds"] for entry in state.log),
+        "train_samples": data.num_train,
+        "val_samples": len(data.samples["val"]),
+        "test_samples": len(data.samples["test"]),
+    }
+    roles: tuple[tuple[Role, Path], ...] = (("val", run.validation), ("test", run.predictions))
+    for role, path in roles:
+        if not data.samples[role]:
+            continue
+        loader = data.loader(role, config.num_points)
+        result = evaluate(network, loader, fabric)
+        mask = result.has_state
+        samples = [name for name, has_state in zip(data.samples[role], mask, strict=True) if has_state]
+        write_predictions(path, samples, result.labels[mask], result.probabilities[mask])
+        metrics |= {f"{role}_macro_f1": result.macro_f1, f"{role}_accuracy": result.accuracy}
+        if role == "test" and result.head_values:
+            columns = head_columns(result.head_values, loader.centroids)
+            write_head_outputs(run.head_outputs, data.samples[role], columns)
+        if role == "test" and result.part_counts is not None:
+            metrics["test_part_counts"] = result.part_counts.tolist()
+    return metrics
+
+
+def create_fabric(recipe: Recipe) -> lightning_fabric.Fabric:
+    """Return the device and precision of a recipe: a GPU if there is one."""
+    logging.getLogger("lightning_fabric").setLevel(logging.WARNING)  # it announces the precision of every run
+    bf16 = recipe.precision == "bf16" or (recipe.precision == "auto" and has_fast_bf16())
+    return lightning_fabric.Fabric(
+        accelerator="auto", devices=1, precision="bf16-mixed" if bf16 else "32-true"
+    )
+
+
+@contextmanager
+def torch_threads(count: int | None) -> Iterator[None]:
+    """Set the number of torch's threads within the block; None leaves it unchanged."""
+    before = torch.get_num_threads()
+    torch.set_num_threads(count or before)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
