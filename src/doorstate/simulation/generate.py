@@ -1,158 +1,83 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The paper's presets: from a seed to manifest rows of one door, seen from a half-ring of poses."""
+"""Samples of one pose: drawn, rendered, and described by the counts of visible pixels."""
 
 from __future__ import annotations
 
-import math
-from typing import Any, Literal
-
-import numpy as np
-from pydantic import ConfigDict, Field, SerializerFunctionWrapHandler, model_serializer
-
-from doorstate._models import FrozenModel
-from doorstate.errors import ConfigError
-from doorstate.simulation.door_draws import ANGLES_DEG
-from doorstate.simulation.frames import Frame, door_place, simulate
-from doorstate.simulation.placement import draw_heading_rad, half_ring, reduced_ring
-from doorstate.simulation.scene import Box, Door, build_scene
-from doorstate.simulation.sensor import CameraPose, DepthCamera
-from doorstate.types import DoorState
-
-_State = Literal["closed", "semi_open", "open"]
+from doorstate.simulation.camera import DepthCamera
+from doorstate.simulation.frames import Frame, depth_sha256, replay
+from doorstate.simulation.noise.models import find_sensor
+from doorstate.simulation.occlusion import DoorView, occluded_bin
+from doorstate.simulation.presets import Preset, draw_rows
+from doorstate.simulation.render import cut_range
+from doorstate.simulation.row import Row
+from doorstate.simulation.scene.scene import clutter_boxes
+from doorstate.simulation.visibility import looks_into, opening_depth_m, same_image
+from doorstate.types import DepthImage, Part
 
 
-class Preset(FrozenModel):
-    """What a data set draws its scenes from; opening angles in degrees, one range per state."""
-
-    name: str
-    angles_deg: dict[_State, tuple[float, float]]
-    door: Door
-    camera: DepthCamera = DepthCamera()
-    camera_height_m: float = Field(default=1.0, gt=0.0, lt=2.5)
-
-
-_RANGES: dict[_State, tuple[float, float]] = {
-    "closed": ANGLES_DEG[DoorState.CLOSED],
-    "semi_open": ANGLES_DEG[DoorState.SEMI_OPEN],
-    "open": ANGLES_DEG[DoorState.OPEN],
-}
-_FIXED: dict[_State, tuple[float, float]] = {
-    "closed": (0.0, 0.0),
-    "semi_open": (45.0, 45.0),
-    "open": (90.0, 90.0),
-}
-# The leaf swings towards the robot: with a leaf that swings away, 240 of the 1353 poses give one and the same image for
-# semi-open and open, and nobody could pass 95 %, yet the paper reports over 98 % (docs/adr/0003).
-_TOWARDS, _AWAY = Door(swing="towards"), Door(swing="away")
-PRESETS = {
-    preset.name: preset
-    for preset in (
-        Preset(name="ogurob", angles_deg=_RANGES, door=_TOWARDS),
-        Preset(name="ogurob-fixed", angles_deg=_FIXED, door=_TOWARDS),
-        Preset(name="ogurob-away", angles_deg=_RANGES, door=_AWAY),
-    )
-}
-
-
-class SampleRow(FrozenModel):
-    """One line of the manifest; scene and camera columns rebuild the frame, the others describe it.
-
-    Poses are in the door frame (simulation.scene) but for `door_*`, which is the door frame in the sensor frame.
-    """
-
-    model_config = ConfigDict(allow_inf_nan=False)
-
-    sample_id: str
-    pose_id: str
-    state: _State
-    opening_angle_deg: float
-    x_m: float
-    y_m: float
-    camera_height_m: float
-    heading_deg: float
-    pitch_deg: float = 0.0
-    seed: int
-    door: Door
-    camera: DepthCamera
-    distance_m: float
-    robot_angle_deg: float
-    door_x_m: float
-    door_y_m: float
-    door_z_m: float
-    door_yaw_deg: float
-    measured_px: int = 0
-    visible_leaf_px: int = 0
-    visible_frame_px: int = 0
-    visible_opening_px: int = 0
-    same_image_as: str = ""
-    depth_sha256: str = ""
-    sensor: str = "none"
-
-    @model_serializer(mode="wrap")
-    def _omit_defaults(self, fields: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        # Manifests without a sensor have no column for one.
-        return {name: value for name, value in fields(self).items() if (name, value) != ("sensor", "none")}
-
-    def camera_pose(self) -> CameraPose:
-        """The camera in the door frame."""
-        at_m = self.x_m, self.y_m, self.camera_height_m
-        return CameraPose.of_degrees(at_m, self.heading_deg, self.pitch_deg)
-
-    def boxes(self) -> list[Box]:
-        """What the camera looks at."""
-        return build_scene(self.door, math.radians(self.opening_angle_deg))
-
-
-def draw_pose(preset: Preset, seed: int, index: int) -> list[SampleRow]:
-    """The three samples of one pose, drawn and not yet rendered.
-
-    Draws depend on (seed, position index, state) alone, so any order or sharding gives the same rows.
-    """
-    position = half_ring()[index]
-    heading_rad = draw_heading_rad(position, seed, index)
-    rows = []
-    for state in DoorState:
-        low, high = preset.angles_deg[state.label]  # type: ignore[index]
-        # From 1: numpy pads short seeds with zeros, so that 0 would draw the heading's number again.
-        angle_deg = float(np.random.default_rng([seed, index, 1 + int(state)]).uniform(low, high))
-        rows.append(
-            SampleRow(
-                sample_id=f"p{index:04d}-{state.label}",
-                pose_id=f"p{index:04d}",
-                state=state.label,  # type: ignore[arg-type]
-                opening_angle_deg=angle_deg,
-                x_m=position.x_m,
-                y_m=position.y_m,
-                camera_height_m=preset.camera_height_m,
-                heading_deg=math.degrees(heading_rad),
-                seed=seed,
-                door=preset.door,
-                camera=preset.camera,
-                distance_m=round(math.hypot(position.x_m, position.y_m), 9),
-                robot_angle_deg=round(math.degrees(math.atan2(position.row, position.column)), 9),
-                **door_place(position.x_m, position.y_m, preset.camera_height_m, heading_rad),
-            )
-        )
-    return rows
-
-
-def simulate_pose(
+def simulate_rows(
     preset: Preset, seed: int, index: int, sensor: str = "none"
-) -> tuple[list[SampleRow], list[Frame]]:
-    """Draw and render the three samples of one pose and fill in what can be seen of the door."""
-    size_m = preset.door.opening_width_m, preset.door.opening_height_m
-    return simulate(draw_pose(preset, seed, index), sensor, size_m)
-
-
-def pose_indices(poses: int | None) -> list[int]:
-    """Which positions a data set of `poses` positions uses; None is all 1353.
+) -> tuple[list[Row], list[Frame]]:
+    """Draw and render the samples of one pose, and fill in the columns that depend on their images.
 
     Raises:
-        ConfigError: more positions than there are, or none.
+        ConfigError: no such sensor.
     """
-    if poses is None:
-        return list(range(len(half_ring())))
-    try:
-        return reduced_ring(poses)
-    except ValueError as error:
-        raise ConfigError(f"--poses {poses}: {error}") from error
+    rows = [with_sensor(row, sensor) for row in draw_rows(preset, seed, index)]
+    frames = [replay(row) for row in rows]
+    # Compared without noise: two states that differ in noise alone are still the same.
+    clean = [cut_range(frame.full, row.camera).depth_m for row, frame in zip(rows, frames, strict=True)]
+    opening_m = _opening_depth_m(rows[0])
+    described = []
+    for row, frame, depth_m in zip(rows, frames, clean, strict=True):
+        columns: dict[str, object] = {
+            "measured_px": int((frame.cut.part != Part.NONE).sum()),
+            "same_image_as": _same_images(row, depth_m, rows, clean),
+            "depth_sha256": depth_sha256(frame),
+        }
+        described.append(row.model_copy(update=columns | _door_columns(row, frame, opening_m)))
+    return described, frames
+
+
+def with_sensor(row: Row, sensor: str) -> Row:
+    """Return the row for this sensor, with the sensor's own camera unless that is the default camera.
+
+    Raises:
+        ConfigError: no such sensor.
+    """
+    camera = find_sensor(sensor).camera
+    return row.model_copy(update={"sensor": sensor} | ({} if camera == DepthCamera() else {"camera": camera}))
+
+
+def _same_images(row: Row, depth_m: DepthImage, rows: list[Row], images: list[DepthImage]) -> str:
+    """Return the states of the pose's other samples with the same image, sorted and separated by spaces."""
+    states = {
+        sample.state
+        for sample, image in zip(rows, images, strict=True)
+        if sample.state != row.state and same_image(depth_m, image)
+    }
+    return " ".join(sorted(states))
+
+
+def _opening_depth_m(row: Row) -> DepthImage | None:
+    door = row.scene.door
+    if door is None:
+        return None
+    size_m = door.opening_width_m, door.opening_height_m
+    return opening_depth_m(row.camera_pose(), row.camera.intrinsics(), *size_m)
+
+
+def _door_columns(row: Row, frame: Frame, opening_m: DepthImage | None) -> dict[str, object]:
+    if opening_m is None:
+        return {}
+    share = 0.0
+    if row.scene.items:
+        view = DoorView(row.scene, row.opening(), row.camera_pose(), row.camera)
+        share = view.occluded_share(clutter_boxes(row.scene))
+    return {
+        "visible_leaf_px": int((frame.cut.part == Part.LEAF).sum()),
+        "visible_frame_px": int((frame.cut.part == Part.FRAME).sum()),
+        "visible_opening_px": int(looks_into(frame.full.depth_m, opening_m).sum()),
+        "occluded_share": share,
+        "occluded_bin": occluded_bin(share),
+    }

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Manifest rows as columns: one flat line a sample, nested settings as `door.hinge`, floats that read back exactly."""
+"""Manifest rows as CSV columns: nested settings as `camera.width`, the scene as JSON, floats that read back exactly."""
 
 from __future__ import annotations
 
@@ -12,46 +12,46 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from doorstate.errors import DatasetError, first_validation_error
-from doorstate.simulation.generate import SampleRow
-from doorstate.simulation.scene_rows import SceneRow
-
-Row = SampleRow | SceneRow
+from doorstate.simulation.row import Row
 
 
 def flatten(row: Row) -> dict[str, str]:
-    """Columns and their text, in the order of the model's fields; what a row does not have is empty."""
+    """Return columns and their text in the order of the fields; None is an empty text."""
     columns: dict[str, str] = {}
     for name, value in row.model_dump().items():
         if isinstance(value, dict):
-            columns |= {f"{name}.{key}": str(inner) for key, inner in value.items()}
+            columns |= {f"{name}.{key}": _text(inner) for key, inner in value.items()}
         else:
-            columns[name] = "" if value is None else str(value)
+            columns[name] = _text(value)
     return columns
 
 
 def unflatten(columns: Mapping[str, str]) -> Row:
-    """The row behind a line of a manifest; columns the model does not know are left out.
+    """Return the row of a line; columns that are no fields of `Row` are ignored.
 
     Raises:
-        DatasetError: a column is missing or holds what it cannot hold.
+        DatasetError: a column is missing or has an invalid value.
     """
-    model: type[Row] = SceneRow if columns.get("scene") else SampleRow
     nested: dict[str, Any] = {}
     for name, value in columns.items():
         outer, _, inner = name.partition(".")
-        if outer not in model.model_fields or not value:
+        if outer not in Row.model_fields or not value:
             continue
         if inner:
             nested.setdefault(outer, {})[inner] = value
         else:
             nested[outer] = value
     try:
-        return model.model_validate(nested)
+        return Row.model_validate(nested)
     except ValidationError as error:
-        line = columns.get("sample_id", "?")
-        raise DatasetError(f"manifest line {line}, column {first_validation_error(error)}") from error
+        sample = columns.get("sample_id", "?")
+        raise DatasetError(f"manifest line {sample}, column {first_validation_error(error)}") from error
 
 
-def numbers(rows: Sequence[Mapping[str, str]], *names: str) -> NDArray[np.float64]:
-    """(M,) numbers under the first of the names that a row has, NaN where it has none."""
-    return np.array([float(next((row[name] for name in names if row.get(name)), math.nan)) for row in rows])
+def numbers(rows: Sequence[Mapping[str, str]], column: str) -> NDArray[np.float64]:
+    """Return the (M,) numbers of a column, NaN where a row lacks it."""
+    return np.array([float(row.get(column) or math.nan) for row in rows])
+
+
+def _text(value: object) -> str:
+    return "" if value is None else str(value)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A scene as an SDF world: its boxes and the depth camera that looks at them, for Gazebo (SDFormat 1.7).
+"""Export of a manifest row as an SDF world for Gazebo (SDFormat 1.7): the scene's boxes and the depth camera.
 
-World frame is the door frame (scene.py). The camera is that of a manifest row, and its image the row's frame.
+The world frame is the door frame.
 """
 
 from __future__ import annotations
@@ -10,23 +10,26 @@ import math
 import xml.etree.ElementTree as ET
 
 from doorstate.errors import ConfigError
-from doorstate.simulation.frames import Sample
-from doorstate.simulation.scene import Box
-from doorstate.simulation.sensor import CameraPose, DepthCamera
+from doorstate.simulation.camera import CameraPose, DepthCamera
+from doorstate.simulation.row import Row
+from doorstate.simulation.scene.box import Box
 from doorstate.simulation.shading import COLORS
 
-_FAR_M = 20.0  # beyond the depth that is reported, as Gazebo reports what is clipped as infinite
+_FAR_M = 20.0  # beyond every camera's range: Gazebo reports clipped depth as infinite
 _GLASS_TRANSPARENCY = 0.8
 
 
-def sdf_world(row: Sample, name: str) -> str:
-    """The world of a row, without its sensor's noise, as XML text that reads back to the same numbers.
+def sdf_world(row: Row, name: str) -> str:
+    """Return the world of a row as XML text that reads back to the same numbers; sensor noise is left out.
 
     Raises:
-        ConfigError: the camera is not centred, as Gazebo's are.
+        ConfigError: the camera's centre of projection is not the image's, which Gazebo does not offer.
     """
     if row.camera.cx_px is not None or row.camera.cy_px is not None:
-        raise ConfigError(f"{name}: its camera is not centred, as Gazebo's are; take a row of another sensor")
+        raise ConfigError(
+            f"{name}: its camera is not centred, and Gazebo has no such camera",
+            hint="use a row of another sensor",
+        )
     sdf = ET.Element("sdf", version="1.7")
     world = ET.SubElement(sdf, "world", name=name)
     light = ET.SubElement(world, "light", name="sun", type="directional")

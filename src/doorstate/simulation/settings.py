@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a simulated data set is made of: a preset, a seed, and how much of it."""
+"""Settings of a simulated data set: a preset, a seed, and the number of poses."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Literal
 
 from pydantic import Field
@@ -11,77 +10,78 @@ from pydantic import Field
 from doorstate._models import FrozenModel
 from doorstate.errors import ConfigError
 from doorstate.simulation.frames import Frame
-from doorstate.simulation.generate import PRESETS, Preset, pose_indices, simulate_pose
-from doorstate.simulation.manifest import Row
+from doorstate.simulation.generate import simulate_rows
 from doorstate.simulation.noise.models import find_sensor
-from doorstate.simulation.scene_rows import SCENE_PRESETS, ScenePreset, simulate_scene
+from doorstate.simulation.presets import PRESETS, Preset
+from doorstate.simulation.row import Row
 
 RawKind = Literal["pcd", "depth", "image"]
 RAW_KINDS: tuple[RawKind, ...] = ("pcd", "depth", "image")
-DEFAULT_SCENES = 1000
 
 
 class SimulationSettings(FrozenModel):
-    """One door, seen from the half-ring of poses or some of it."""
+    """A preset with its seed and extent.
+
+    `poses` counts poses of the half-ring, or scenes for presets of many scenes, which have one pose each; None is all
+    of the half-ring, or 1000 scenes. `raw` lists the raw files to write beside the manifest.
+    """
 
     preset: Preset
     seed: int
-    poses: int | None
+    poses: int | None = Field(default=None, ge=1)
     raw: tuple[RawKind, ...] = ()
     sensor: str = "none"
 
     def indices(self) -> list[int]:
-        """Numbers of the poses."""
-        return pose_indices(self.poses)
+        """Return the numbers of the poses.
 
-    def simulate(self, index: int) -> tuple[Sequence[Row], list[Frame]]:
-        """Rows and frames of one pose."""
-        return simulate_pose(self.preset, self.seed, index, self.sensor)
+        Raises:
+            ConfigError: more poses than the half-ring has.
+        """
+        return self.preset.indices(self.poses)
 
-
-class SceneSettings(FrozenModel):
-    """Many scenes, each seen from one pose."""
-
-    preset: ScenePreset
-    seed: int
-    scenes: int = Field(default=DEFAULT_SCENES, ge=1)
-    raw: tuple[RawKind, ...] = ()
-    sensor: str = "none"
-
-    def indices(self) -> list[int]:
-        """Numbers of the scenes."""
-        return list(range(self.scenes))
-
-    def simulate(self, index: int) -> tuple[Sequence[Row], list[Frame]]:
-        """Rows and frames of one scene."""
-        return simulate_scene(self.preset, self.seed, index, self.sensor)
-
-
-Settings = SimulationSettings | SceneSettings
+    def simulate(self, index: int) -> tuple[list[Row], list[Frame]]:
+        """Return rows and frames of one pose."""
+        return simulate_rows(self.preset, self.seed, index, self.sensor)
 
 
 def settings_for(
     preset: str,
     seed: int,
-    poses: int | None,
-    scenes: int | None,
+    poses: int | None = None,
+    scenes: int | None = None,
     raw: tuple[RawKind, ...] = (),
     sensor: str = "none",
-) -> Settings:
-    """Settings of a preset by its name; poses belong to presets of one door, scenes to the others.
+) -> SimulationSettings:
+    """Return the settings of a preset by its name.
+
+    Args:
+        preset: name in `PRESETS`.
+        seed: of all random numbers.
+        poses: number of poses, for presets of one scene.
+        scenes: number of scenes, for presets of many scenes.
+        raw: raw files to write.
+        sensor: name for `find_sensor`.
 
     Raises:
-        ConfigError: no such preset or sensor, or the preset has no such number.
+        ConfigError: no such preset or sensor, a number the preset does not take, or one that is impossible.
     """
     find_sensor(sensor)
-    if preset in PRESETS:
-        if scenes is not None:
-            raise ConfigError(f"--scenes {scenes}: preset {preset!r} has one scene; choose --poses")
-        return SimulationSettings(preset=PRESETS[preset], seed=seed, poses=poses, raw=raw, sensor=sensor)
-    for name, scene_preset in SCENE_PRESETS.items():
-        if name == preset:
-            if poses is not None:
-                raise ConfigError(f"--poses {poses}: preset {preset!r} has one pose a scene; choose --scenes")
-            count = DEFAULT_SCENES if scenes is None else scenes
-            return SceneSettings(preset=scene_preset, seed=seed, scenes=count, raw=raw, sensor=sensor)
-    raise ConfigError(f"no preset {preset!r}: choose one of {', '.join([*PRESETS, *SCENE_PRESETS])}")
+    if preset not in PRESETS:
+        raise ConfigError(f"no preset {preset!r}", field="preset", expected=f"one of {', '.join(PRESETS)}")
+    chosen = PRESETS[preset]
+    if chosen.has_many_scenes and poses is not None:
+        raise ConfigError(
+            f"preset {preset!r} has one pose per scene", field="poses", suggestions={"scenes": poses}
+        )
+    if not chosen.has_many_scenes and scenes is not None:
+        raise ConfigError(f"preset {preset!r} has one scene", field="scenes", suggestions={"poses": scenes})
+    count = scenes if chosen.has_many_scenes else poses
+    if count is not None and count < 1:
+        raise ConfigError(
+            f"{count} is too few",
+            field="scenes" if chosen.has_many_scenes else "poses",
+            expected="at least 1",
+        )
+    chosen.indices(count)
+    return SimulationSettings(preset=chosen, seed=seed, poses=count, raw=raw, sensor=sensor)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A colour-like picture of a rendered scene, for the eye: part colours under a lamp beside the camera."""
+"""Shaded pictures of rendered scenes: part colours under a lamp beside the camera."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from doorstate.io.camera import Intrinsics
 from doorstate.io.depth import depth_to_points
-from doorstate.simulation.sensor import Render
+from doorstate.simulation.render import Render
 from doorstate.types import Part
 
 COLORS = {
@@ -28,7 +28,7 @@ _LAMP = (_TOWARDS_LAMP / np.linalg.norm(_TOWARDS_LAMP)).astype(np.float32)
 
 
 def shade(rendered: Render, intrinsics: Intrinsics) -> NDArray[np.uint8]:
-    """Draw an uncut rendering.
+    """Shade a rendering whose range is not cut.
 
     Returns:
         (H, W, 3) uint8 RGB.
@@ -36,14 +36,13 @@ def shade(rendered: Render, intrinsics: Intrinsics) -> NDArray[np.uint8]:
     points = depth_to_points(
         np.where(np.isinf(rendered.depth_m), np.float32(1e3), rendered.depth_m), intrinsics
     )
-    # Coordinate by coordinate takes a quarter of the time of gradients and cross products of (H, W, 3).
-    (dx, rx), (dy, ry), (dz, rz) = (np.gradient(each) for each in np.moveaxis(points, -1, 0).copy())
+    # One coordinate at a time takes a quarter of the time of gradients and cross products of (H, W, 3).
+    (dx, rx), (dy, ry), (dz, rz) = (np.gradient(axis) for axis in np.moveaxis(points, -1, 0).copy())
     normal = (ry * dz - rz * dy, rz * dx - rx * dz, rx * dy - ry * dx)
-    length = np.sqrt(sum(each * each for each in normal))
-    across = sum(each * towards for each, towards in zip(normal, _LAMP, strict=True))
-    # Faces are lit from both sides: the sign of a depth gradient's normal says nothing here.
+    length = np.sqrt(sum(component * component for component in normal))
+    across = sum(component * lamp for component, lamp in zip(normal, _LAMP, strict=True))
+    # The absolute value, because the sign of a normal from depth gradients is arbitrary.
     light = 0.45 + 0.55 * np.abs(across) / np.maximum(length, 1e-12)
-    nothing = rendered.part == Part.NONE
-    light[nothing] = 1.0
+    light[rendered.part == Part.NONE] = 1.0
     shaded: NDArray[np.uint8] = np.clip(_PALETTE[rendered.part] * light[..., None], 0, 255).astype(np.uint8)
     return shaded

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Noise along the viewing axis: normal, with a standard deviation that depends on depth and incidence."""
+"""Normal noise along the viewing axis, with a standard deviation that depends on depth and incidence."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from pydantic import Field
 from doorstate._models import FrozenModel
 from doorstate.types import DepthImage
 
-_STEEPEST_RAD = np.float32(math.radians(85.0))  # chosen: the published term is infinite at 90 degrees
+_STEEPEST_RAD = np.float32(math.radians(85.0))  # assumed: the published term is infinite at 90 degrees
 
 
 class ConstantAxial(FrozenModel):
-    """The same everywhere."""
+    """The same standard deviation in all pixels."""
 
     kind: Literal["constant"] = "constant"
     deviation_m: float = Field(ge=0)
@@ -25,11 +25,11 @@ class ConstantAxial(FrozenModel):
     def sigma_m(
         self, depth_m: DepthImage, incidence_rad: NDArray[np.float32], focal_px: float
     ) -> NDArray[np.float32]:
-        """Standard deviation of each pixel.
+        """Return the standard deviation of each pixel.
 
         Args:
             depth_m: (H, W) metres.
-            incidence_rad: (H, W), of `sensor.incidence`.
+            incidence_rad: (H, W), from `render.incidence`.
             focal_px: of the camera.
 
         Returns:
@@ -39,10 +39,10 @@ class ConstantAxial(FrozenModel):
 
 
 class NguyenAxial(FrozenModel):
-    """Kinect v1 as Nguyen, Izadi and Lovell 2012 measured it: s = a + b (z - c)^2, beyond 60 degrees with
+    """Kinect v1 as measured by Nguyen, Izadi and Lovell 2012: s = a + b (z - c)^2, and beyond 60 degrees in addition
     d / sqrt(z) t^2 / (pi / 2 - t)^2 at incidence t.
 
-    They measured what the sensor gave, its steps of disparity and all.
+    The measured deviation includes the sensor's disparity steps.
     """
 
     kind: Literal["nguyen"] = "nguyen"
@@ -55,7 +55,7 @@ class NguyenAxial(FrozenModel):
     def sigma_m(
         self, depth_m: DepthImage, incidence_rad: NDArray[np.float32], focal_px: float
     ) -> NDArray[np.float32]:
-        """As `ConstantAxial.sigma_m`; beyond 85 degrees that at 85."""
+        """Return the standard deviation as `ConstantAxial.sigma_m` does; constant beyond 85 degrees."""
         sigma = depth_m - np.float32(self.nearest_m)
         sigma *= sigma
         sigma *= np.float32(self.square_per_m)
@@ -68,7 +68,7 @@ class NguyenAxial(FrozenModel):
 
 
 class StereoAxial(FrozenModel):
-    """Stereo of sub-pixel precision p: s = p z^2 / (f b), as Intel states it for RealSense cameras (SIMULATION 3.1)."""
+    """Stereo with sub-pixel precision p: s = p z^2 / (f b), Intel's formula for RealSense cameras (docs/sensors.md)."""
 
     kind: Literal["stereo"] = "stereo"
     baseline_m: float = Field(gt=0)
@@ -77,7 +77,7 @@ class StereoAxial(FrozenModel):
     def sigma_m(
         self, depth_m: DepthImage, incidence_rad: NDArray[np.float32], focal_px: float
     ) -> NDArray[np.float32]:
-        """As `ConstantAxial.sigma_m`."""
+        """Return the standard deviation as `ConstantAxial.sigma_m` does."""
         return depth_m * depth_m * np.float32(self.disparity_px / (focal_px * self.baseline_m))
 
 
@@ -85,7 +85,7 @@ Axial = ConstantAxial | NguyenAxial | StereoAxial
 
 
 def add_noise(depth_m: DepthImage, sigma_m: NDArray[np.float32], rng: np.random.Generator) -> DepthImage:
-    """Depth plus normal noise of a standard deviation (H, W); what is not finite stays."""
+    """Return depth plus normal noise with standard deviations (H, W); inf and NaN stay."""
     noise = rng.standard_normal(depth_m.shape, dtype=np.float32)
     noise *= sigma_m
     noise += depth_m

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pixels that give nothing: at a grazing angle, and here and there."""
+"""Lost pixels: at grazing angles, and in random speckles."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from doorstate.types import DepthImage
 
 
 class Grazing(FrozenModel):
-    """The share lost grows from 0 to 1 between two angles of incidence (SIMULATION section 3.2)."""
+    """Loss probability that grows from 0 to 1 between two angles of incidence (docs/sensors.md)."""
 
     from_deg: float = 70.0
     to_deg: float = 90.0
 
 
 class Speckle(FrozenModel):
-    """Squares that are lost at random, so that this share of all pixels is."""
+    """Random lost squares that together cover this share of all pixels."""
 
     share: float = Field(ge=0, lt=1)
     side_px: int = Field(ge=1)
@@ -30,7 +30,7 @@ class Speckle(FrozenModel):
 def lose_grazing(
     depth_m: DepthImage, incidence_rad: NDArray[np.float32], grazing: Grazing, rng: np.random.Generator
 ) -> DepthImage:
-    """NaN with the probability of each pixel's incidence (H, W)."""
+    """Set pixels to NaN with the probability that belongs to their incidence (H, W)."""
     low, high = math.radians(grazing.from_deg), math.radians(grazing.to_deg)
     steep = np.flatnonzero(incidence_rad > np.float32(low))
     share = (incidence_rad.ravel()[steep] - np.float32(low)) / np.float32(high - low)
@@ -40,10 +40,10 @@ def lose_grazing(
 
 
 def lose_speckle(depth_m: DepthImage, speckle: Speckle, rng: np.random.Generator) -> DepthImage:
-    """NaN in squares whose places are independent; they may overlap and stand over the border."""
+    """Set squares at independent positions to NaN; they may overlap each other and the border."""
     side = speckle.side_px
     height, width = depth_m.shape
-    # A pixel survives if none of the side^2 squares that would cover it is there.
+    # A pixel survives if none of the side^2 squares that could cover it is drawn.
     chance = -math.expm1(math.log1p(-speckle.share) / side**2)
     corners = rng.random((height + side - 1, width + side - 1), dtype=np.float32) < np.float32(chance)
     rows, columns = np.nonzero(corners)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Ragged edges: near the edge of a surface a pixel measures what lies some pixels beside it."""
+"""Ragged edges: near the edge of a surface a pixel takes the measurement of a pixel beside it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from doorstate._models import FrozenModel
-from doorstate.simulation.sensor import Render
+from doorstate.simulation.render import Render
 
 
 class Lateral(FrozenModel):
@@ -18,32 +18,32 @@ class Lateral(FrozenModel):
 
     base_px: float = Field(default=0.8, ge=0)
     slope_px: float = Field(default=0.035, ge=0)
-    reach_px: int = Field(default=3, ge=1)  # chosen: no pixel looks farther aside
+    reach_px: int = Field(default=3, ge=1)  # assumed: largest displacement
 
     def sigma_px(self, incidence_rad: NDArray[np.float32]) -> NDArray[np.float32]:
-        """(M,) pixels, of rays that meet surfaces at (M,) angles."""
+        """Return (M,) standard deviations in pixels for (M,) angles of incidence."""
         steep = np.minimum(incidence_rad, np.float32(1.5))
         ratio: NDArray[np.float32] = np.divide(steep, np.float32(np.pi / 2) - steep)
         return ratio * np.float32(self.slope_px) + np.float32(self.base_px)
 
 
 class Moves(NamedTuple):
-    """Flat indices of pixels and of those whose measurement they take."""
+    """Flat indices of pixels, and of the pixels whose measurement they take."""
 
     targets: NDArray[np.int64]
     sources: NDArray[np.int64]
 
 
 def draw_moves(
-    seen: Render, incidence_rad: NDArray[np.float32], lateral: Lateral, rng: np.random.Generator
+    rendered: Render, incidence_rad: NDArray[np.float32], lateral: Lateral, rng: np.random.Generator
 ) -> Moves:
-    """Which pixels measure another surface than they would.
+    """Draw the pixels that measure a neighbouring surface.
 
-    Within a surface nothing moves: on a slope that would be noise along the ray once more, and the published axial
-    noise is of whole measurements. Pixels lost before stay lost.
+    Within a surface nothing moves: on a slope it would add noise along the ray, which the published axial noise already
+    includes. Lost pixels stay lost.
     """
-    height, width = seen.box.shape
-    near_edge = _widened(_edges(seen.box), lateral.reach_px) & ~np.isnan(seen.depth_m)
+    height, width = rendered.box.shape
+    near_edge = _widened(_edges(rendered.box), lateral.reach_px) & ~np.isnan(rendered.depth_m)
     targets = np.flatnonzero(near_edge)
     aside = rng.standard_normal((2, len(targets)), dtype=np.float32)
     aside *= lateral.sigma_px(incidence_rad.ravel()[targets])
@@ -51,7 +51,7 @@ def draw_moves(
     row = np.clip(targets // width + step[0], 0, height - 1)
     column = np.clip(targets % width + step[1], 0, width - 1)
     sources = row * width + column
-    box = seen.box.ravel()
+    box = rendered.box.ravel()
     moved = box[sources] != box[targets]
     return Moves(targets[moved], sources[moved])
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Surfaces that return too little light, or send it elsewhere: glass, gloss and dark."""
+"""Pixels lost on surfaces that return too little light: glass, gloss and dark."""
 
 from __future__ import annotations
 
@@ -11,50 +11,51 @@ from pydantic import Field
 
 from doorstate._models import FrozenModel
 from doorstate.io.camera import Intrinsics
-from doorstate.simulation.scene import Box
-from doorstate.simulation.sensor import CameraPose, Render, is_made_of, render
+from doorstate.simulation.camera import CameraPose
+from doorstate.simulation.render import Render, is_made_of, render
+from doorstate.simulation.scene.box import Box
 from doorstate.types import DepthImage
 
 
 class Materials(FrozenModel):
-    """Shares of pixels lost, of SIMULATION section 3.2 but for what is marked as chosen."""
+    """Shares of lost pixels (docs/sensors.md)."""
 
-    glass_lost: float = Field(default=0.7, ge=0, le=1)  # the others see what is behind the pane
+    glass_lost: float = Field(default=0.7, ge=0, le=1)  # the other pixels see through the pane
     dark_lost: float = Field(default=0.3, ge=0, le=1)
-    gloss_mirror_deg: float = Field(default=5.0, ge=0)  # chosen: nearer to the normal than this, all is lost
-    patch_px: int = Field(default=8, ge=1)  # chosen: pixels are lost by squares of this side
+    gloss_mirror_deg: float = Field(default=5.0, ge=0)  # assumed: all pixels nearer to the normal are lost
+    patch_px: int = Field(default=8, ge=1)  # assumed: pixels are lost in squares of this side
 
 
 def loss_shares(
     materials: Materials,
-    seen: Render,
+    rendered: Render,
     incidence_rad: NDArray[np.float32],
     boxes: Sequence[Box],
     pose: CameraPose,
     intrinsics: Intrinsics,
 ) -> NDArray[np.float32] | None:
-    """How probable it is that a pixel is lost to its material.
+    """Return the probability of each pixel to be lost on its material.
 
     Args:
-        materials: the shares.
-        seen: what `render_behind_glass` saw.
-        incidence_rad: (H, W), of what it saw.
-        boxes: all, with the glass.
+        materials: shares.
+        rendered: result of `render_behind_glass`.
+        incidence_rad: (H, W), of the same rendering.
+        boxes: of the scene, with the glass.
         pose: of the camera.
         intrinsics: of the camera.
 
     Returns:
-        (H, W), None where every box is matte.
+        (H, W), or None if every box is matte.
     """
     kinds = {box.material for box in boxes}
     if kinds <= {"matte"}:
         return None
-    shares = np.zeros(seen.box.shape, np.float32)
+    shares = np.zeros(rendered.box.shape, np.float32)
     if "dark" in kinds:
-        shares[is_made_of("dark", seen, boxes)] = materials.dark_lost
+        shares[is_made_of("dark", rendered, boxes)] = materials.dark_lost
     if "gloss" in kinds:
         mirrors = incidence_rad < np.radians(materials.gloss_mirror_deg)
-        shares[is_made_of("gloss", seen, boxes) & mirrors] = 1.0
+        shares[is_made_of("gloss", rendered, boxes) & mirrors] = 1.0
     if "glass" in kinds:
         pane = is_made_of("glass", render(boxes, pose, intrinsics), boxes)
         shares[pane] = 1 - (1 - materials.glass_lost) * (1 - shares[pane])
@@ -64,7 +65,7 @@ def loss_shares(
 def lose_patches(
     depth_m: DepthImage, shares: NDArray[np.float32], patch_px: int, rng: np.random.Generator
 ) -> DepthImage:
-    """NaN with each pixel's own probability (H, W), and alike within squares of `patch_px`."""
+    """Set pixels to NaN with their own probability (H, W), with one random number for each square of `patch_px`."""
     height, width = depth_m.shape
     drawn = rng.random((-(-height // patch_px), -(-width // patch_px)), dtype=np.float32)
     spread = drawn.repeat(patch_px, axis=0).repeat(patch_px, axis=1)[:height, :width]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Sensors by name: a camera and the stages that its measurements go through, in the order of SIMULATION section 3.2."""
+"""Sensor models by name: a camera and the stages of its measurement (docs/sensors.md)."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from doorstate._models import FrozenModel
 from doorstate.errors import ConfigError
 from doorstate.io.camera import Intrinsics
+from doorstate.simulation.camera import CAMERAS, CameraPose, DepthCamera
 from doorstate.simulation.noise.axial import Axial, ConstantAxial, NguyenAxial, StereoAxial, add_noise
 from doorstate.simulation.noise.dropout import Grazing, Speckle, lose_grazing, lose_speckle
 from doorstate.simulation.noise.edges import Edges, blur_edges
@@ -26,8 +27,8 @@ from doorstate.simulation.noise.quantisation import (
 )
 from doorstate.simulation.noise.shadow import SecondView, hide_from_second_view
 from doorstate.simulation.noise.streams import stage_rng
-from doorstate.simulation.scene import Box
-from doorstate.simulation.sensor import CAMERAS, CameraPose, DepthCamera, Render, cut_range, incidence
+from doorstate.simulation.render import Render, cut_range, incidence
+from doorstate.simulation.scene.box import Box
 from doorstate.types import DepthImage
 
 Number = TypeVar("Number", bound=np.generic)
@@ -35,7 +36,7 @@ _ANGLE_STEPS = np.float32(2**14)  # in a radian
 
 
 class SensorModel(FrozenModel):
-    """A camera and its stages, which come in the order of the fields; a stage that is None is left out."""
+    """A camera and its stages in the order of the fields; None leaves a stage out."""
 
     name: str
     camera: DepthCamera = CAMERAS["xtion-gazebo"]
@@ -52,11 +53,11 @@ class SensorModel(FrozenModel):
     def added_sigma_m(
         self, depth_m: DepthImage, incidence_rad: NDArray[np.float32], focal_px: float
     ) -> NDArray[np.float32]:
-        """Standard deviation of the axial noise before rounding; (H, W)."""
+        """Return the standard deviation (H, W) of the axial noise before disparity is rounded."""
         assert self.axial is not None
         sigma: NDArray[np.float32] = self.axial.sigma_m(depth_m, incidence_rad, focal_px)
         if self.axial.kind == "nguyen" and self.disparity_steps is not None:
-            # Published for rounded depth: what rounding adds, step^2 / 12, must not be added twice.
+            # The published noise includes rounding, so its variance, step^2 / 12, is subtracted.
             step = self.disparity_steps.step_m(depth_m, focal_px)
             step *= step
             sigma *= sigma
@@ -66,7 +67,7 @@ class SensorModel(FrozenModel):
 
 
 def gaussian(deviation_m: float) -> SensorModel:
-    """Normal noise of one standard deviation, and nothing else."""
+    """Return a model of normal noise with one standard deviation and no other stage."""
     return SensorModel(name=f"gaussian:{deviation_m:g}", axial=ConstantAxial(deviation_m=deviation_m))
 
 
@@ -88,7 +89,7 @@ def _structured_light(name: str, camera: DepthCamera) -> SensorModel:
 
 _D435 = SensorModel(
     name="d435",
-    # f = 424 px; nearest f b / 126; 10 m is chosen.
+    # f = 424 px; nearest depth f b / 126; 10 m is assumed.
     camera=DepthCamera(width=848, height=480, hfov_deg=90.0, min_depth_m=0.168, max_depth_m=10.0),
     materials=Materials(),
     second_view=SecondView(baseline_m=0.050, is_imager=True),
@@ -131,7 +132,7 @@ SENSORS = {
 
 
 def find_sensor(name: str) -> SensorModel:
-    """A model by name; `gaussian:0.02` has a standard deviation of 0.02 m.
+    """Return a model by name; `gaussian:0.02` has a standard deviation of 0.02 m.
 
     Raises:
         ConfigError: no such sensor.
@@ -143,56 +144,66 @@ def find_sensor(name: str) -> SensorModel:
         except ValueError:
             value = math.nan
         if not 0 <= value < math.inf:
-            raise ConfigError(f"sensor {name!r}: after the colon comes a standard deviation in metres")
+            raise ConfigError(
+                f"no sensor {name!r}",
+                field="sensor",
+                expected="a standard deviation in metres after the colon",
+            )
         return gaussian(value)
     if name not in SENSORS:
-        raise ConfigError(f"no sensor {name!r}: choose one of {', '.join(SENSORS)}, or gaussian:METRES")
+        raise ConfigError(
+            f"no sensor {name!r}",
+            field="sensor",
+            expected=f"one of {', '.join(SENSORS)}, or gaussian:METRES",
+        )
     return SENSORS[name]
 
 
-def apply(
+def sense(
     model: SensorModel,
-    seen: Render,
+    rendered: Render,
     boxes: Sequence[Box],
     pose: CameraPose,
     camera: DepthCamera,
     seed: int,
 ) -> Render:
-    """What the sensor measures, cut to the camera's range.
+    """Return the sensor's measurement of a rendering, cut to the camera's range.
 
     Args:
-        model: the sensor.
-        seen: what `render_behind_glass` saw of the boxes from the pose with this camera.
-        boxes: the scene, glass and all.
+        model: of the sensor.
+        rendered: result of `render_behind_glass` for the boxes, pose and camera.
+        boxes: of the scene, with the glass.
         pose: of the camera.
-        camera: the model's own, or another whose noise is to be like the model's.
-        seed: the sample's own (`streams.sample_seed`).
+        camera: of the model, or another one.
+        seed: of the sample (`streams.sample_seed`).
 
     Returns:
-        Depth NaN, part NONE and box NO_BOX where nothing is measured; at ragged edges labels move with measurements.
+        Depth NaN, part NONE and box NO_BOX where nothing is measured; at ragged edges parts move with the depth.
     """
-    return cut_range(distort(model, seen, boxes, pose, camera.intrinsics(), seed), camera)
+    return cut_range(distort(model, rendered, boxes, pose, camera.intrinsics(), seed), camera)
 
 
 def distort(
     model: SensorModel,
-    seen: Render,
+    rendered: Render,
     boxes: Sequence[Box],
     pose: CameraPose,
     intrinsics: Intrinsics,
     seed: int,
 ) -> Render:
-    """As `apply`, before the range is cut: inf where the ray hits nothing, NaN where the measurement is lost.
+    """Return the measurement before the range is cut: inf where the ray hits nothing, NaN where a pixel is lost.
 
-    A lost pixel stays lost in every later stage.
+    Arguments are those of `sense`. A lost pixel stays lost in every later stage.
     """
-    angle_rad = _incidence(model, seen, boxes, pose, intrinsics)
-    seen = _hide(model, seen, angle_rad, boxes, pose, intrinsics, seed)
+    angle_rad = _incidence(model, rendered, boxes, pose, intrinsics)
+    rendered = _hide(model, rendered, angle_rad, boxes, pose, intrinsics, seed)
     if model.lateral is not None:
-        moves = draw_moves(seen, angle_rad, model.lateral, stage_rng(seed, "lateral"))
-        seen = Render(_moved(seen.depth_m, *moves), _moved(seen.part, *moves), _moved(seen.box, *moves))
+        moves = draw_moves(rendered, angle_rad, model.lateral, stage_rng(seed, "lateral"))
+        rendered = Render(
+            _moved(rendered.depth_m, *moves), _moved(rendered.part, *moves), _moved(rendered.box, *moves)
+        )
         angle_rad = _moved(angle_rad, *moves)
-    depth_m = surface_m = seen.depth_m
+    depth_m = surface_m = rendered.depth_m
     if model.axial is not None:
         depth_m = _with_axial_noise(model, depth_m, angle_rad, intrinsics.fx, seed)
     if model.disparity_steps is not None:
@@ -205,42 +216,42 @@ def distort(
         depth_m = lose_speckle(depth_m, model.speckle, stage_rng(seed, "speckle"))
     if model.depth_steps is not None:
         depth_m = round_depth(depth_m, model.depth_steps)
-    return seen._replace(depth_m=depth_m)
+    return rendered._replace(depth_m=depth_m)
 
 
 def _incidence(
-    model: SensorModel, seen: Render, boxes: Sequence[Box], pose: CameraPose, intrinsics: Intrinsics
+    model: SensorModel, rendered: Render, boxes: Sequence[Box], pose: CameraPose, intrinsics: Intrinsics
 ) -> NDArray[np.float32]:
-    """Angle of incidence; zeros where no stage asks for it, since it costs as much as a rendering."""
+    """Return the angle of incidence, or zeros if no stage needs it, because it costs as much as a rendering."""
     glossy = model.materials is not None and any(box.material == "gloss" for box in boxes)
     steep = model.lateral is not None or model.grazing is not None
     if not (glossy or steep or (model.axial is not None and model.axial.kind == "nguyen")):
-        return np.zeros(seen.box.shape, np.float32)
-    # Processors differ in the last digits of an arc cosine; on a grid of 2^-14 rad they agree.
+        return np.zeros(rendered.box.shape, np.float32)
+    # Processors differ in the last digits of an arc cosine; rounded to 2^-14 rad they agree.
     rounded: NDArray[np.float32] = (
-        np.rint(incidence(seen, boxes, pose, intrinsics) * _ANGLE_STEPS) / _ANGLE_STEPS
+        np.rint(incidence(rendered, boxes, pose, intrinsics) * _ANGLE_STEPS) / _ANGLE_STEPS
     )
     return rounded
 
 
 def _hide(
     model: SensorModel,
-    seen: Render,
+    rendered: Render,
     angle_rad: NDArray[np.float32],
     boxes: Sequence[Box],
     pose: CameraPose,
     intrinsics: Intrinsics,
     seed: int,
 ) -> Render:
-    depth_m = seen.depth_m
+    depth_m = rendered.depth_m
     if model.materials is not None:
-        shares = loss_shares(model.materials, seen, angle_rad, boxes, pose, intrinsics)
+        shares = loss_shares(model.materials, rendered, angle_rad, boxes, pose, intrinsics)
         if shares is not None:
             rng = stage_rng(seed, "materials")
             depth_m = lose_patches(depth_m, shares, model.materials.patch_px, rng)
     if model.second_view is not None:
         depth_m = hide_from_second_view(depth_m, model.second_view, intrinsics.fx)
-    return seen._replace(depth_m=depth_m)
+    return rendered._replace(depth_m=depth_m)
 
 
 def _with_axial_noise(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the camera sees and the second view does not: a pattern projector's shadow, or a stereo pair's occlusion.
+"""Pixels hidden from the second view: a pattern projector's shadow, or a stereo pair's occlusion.
 
 With the second view at a baseline b to the right, a pixel at column u and depth z lies at column u - f b / z there. A
 surface is hidden if a nearer one lies at the same column: f b (1 / z_near - 1 / z_far) pixels are without depth.
@@ -18,23 +18,23 @@ from doorstate.types import DepthImage
 
 
 class SecondView(FrozenModel):
-    """Where the projector or second imager is."""
+    """Position of the projector or second imager."""
 
     baseline_m: float = Field(gt=0)
     towards: Literal["right", "down"] = "right"  # from the camera, in the image
-    # An imager sees no farther aside than the camera does, so a band is without depth; a projector reaches farther.
+    # An imager has the camera's field of view, so a band at the border has no depth; a projector's field is wider.
     is_imager: bool = False
-    # Chosen: less apart is one surface. A plane farther from the camera than three baselines never is as much apart.
+    # Assumed: smaller gaps are one surface. A plane farther away than three baselines never has such gaps.
     tolerance_px: float = Field(default=0.5, gt=0)
 
 
 def hide_from_second_view(depth_m: DepthImage, view: SecondView, focal_px: float) -> DepthImage:
-    """NaN where the second view cannot see the surface; (H, W) metres, inf where there is none."""
+    """Set pixels to NaN where the second view cannot see the surface; (H, W) metres, inf where there is none."""
     if view.towards == "down":
         turned = hide_from_second_view(depth_m.T, view.model_copy(update={"towards": "right"}), focal_px)
         return np.ascontiguousarray(turned.T)
-    seen_m = np.where(np.isnan(depth_m), np.float32(np.inf), depth_m)
-    disparity: NDArray[np.float32] = np.divide(np.float32(focal_px * view.baseline_m), seen_m)
+    surface_m = np.where(np.isnan(depth_m), np.float32(np.inf), depth_m)
+    disparity: NDArray[np.float32] = np.divide(np.float32(focal_px * view.baseline_m), surface_m)
     column = np.arange(depth_m.shape[1], dtype=np.float32) - disparity
     hidden = _covered(disparity, np.floor(column).astype(np.int32), view.tolerance_px)
     if view.is_imager:
@@ -45,7 +45,7 @@ def hide_from_second_view(depth_m: DepthImage, view: SecondView, focal_px: float
 def _covered(
     disparity: NDArray[np.float32], column: NDArray[np.int32], tolerance_px: float
 ) -> NDArray[np.bool_]:
-    """Z-buffer of the second view: whether something nearer fills both columns that a pixel lies between."""
+    """Return pixels whose two nearest columns in the second view's z-buffer both hold something nearer."""
     height, width = disparity.shape
     first = int(column.min(initial=0))
     stride = width - first + 1

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Random streams: one for each sample and stage, none of which moves when another stage draws more or is left out."""
+"""Random streams, one for each sample and stage: a change of one stage leaves the numbers of the others as they are."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import numpy as np
 
 
 def sample_seed(seed: int, sample_id: str) -> int:
-    """A seed of 64 bits for one sample of a data set."""
+    """Return a 64-bit seed for one sample of a data set."""
     return int.from_bytes(hashlib.sha256(f"{seed} {sample_id}".encode()).digest()[:8], "little")
 
 
 def stage_rng(seed: int, stage: str) -> np.random.Generator:
-    """The stream of one stage of one sample."""
-    # Spawn keys, unlike longer seeds, are never one another's beginning padded with zeros (paper/log.md).
+    """Return the stream of one stage of one sample."""
+    # Spawn keys, because numpy pads short seeds with zeros: [1] and [1, 0] would be one stream.
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(zlib.crc32(stage.encode()),)))

@@ -1,43 +1,39 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Handles: lever, knob or bar on both faces of a leaf."""
+"""Handles: lever, knob or bar on a face of a leaf."""
 
 from __future__ import annotations
 
 from typing import Literal
 
 from doorstate._models import FrozenModel
-from doorstate.simulation.draws import Draws
-from doorstate.simulation.scene import Box
+from doorstate.simulation.scene.box import Box
 from doorstate.types import Part
+
+HandleKind = Literal["lever", "knob", "bar"]
 
 BACKSET_M = 0.065  # from the leaf's free edge
 _ROD_M = 0.02
 _KNOB_M = 0.055
-_SHARES: dict[Literal["lever", "knob", "bar"], float] = {"lever": 0.6, "knob": 0.2, "bar": 0.2}
 
 
 class Handle(FrozenModel):
-    """A handle; `length_m` is that of a lever's or bar's grip."""
+    """A handle; `length_m` is the length of a lever's or bar's grip."""
 
-    kind: Literal["lever", "knob", "bar"]
+    kind: HandleKind
     height_m: float
     projection_m: float
     length_m: float
 
 
-def draw_handle(draws: Draws, kinds: dict[Literal["lever", "knob", "bar"], float] = _SHARES) -> Handle:
-    """0.85 to 1.10 m high; levers 0.12-0.14 m, bars 0.3-0.9 m long, 0.05-0.07 m in front of the leaf."""
-    kind = draws.one_of(kinds)
-    return Handle(
-        kind=kind,
-        height_m=draws.between(0.85, 1.10),
-        projection_m=draws.between(0.05, 0.07),
-        length_m=draws.between(0.3, 0.9) if kind == "bar" else draws.between(0.12, 0.14),
-    )
-
-
 def handle_boxes(handle: Handle, leaf_width_m: float, face_y_m: float, side: int) -> list[Box]:
-    """Boxes in the leaf's frame (doors.py) on one face, the one that looks to +y (`side` 1) or to -y (-1)."""
+    """Return boxes in the leaf's frame on one face.
+
+    Args:
+        handle: kind and sizes.
+        leaf_width_m: of the leaf.
+        face_y_m: y of the face.
+        side: direction of the face's normal, 1 for +y and -1 for -y.
+    """
     x, reach, z = leaf_width_m - BACKSET_M, handle.projection_m, handle.height_m
 
     def box(at_x: float, out_m: float, at_z: float, size: tuple[float, float, float]) -> Box:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A depth camera that looks at boxes: exact slab test (Kay & Kajiya 1986), each box only over its own pixels.
+"""Depth images of boxes by an exact slab test (Kay & Kajiya 1986), each box only over its own pixels.
 
 A ray is `origin + t * direction` with the direction scaled so that t is z-depth, as a depth camera reports it. Along
 each axis of a box the direction is linear in the pixel's column and row; for a level camera it depends on one of the
@@ -10,16 +10,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import SerializerFunctionWrapHandler, model_serializer
 
-from doorstate._models import FrozenModel
 from doorstate.io.camera import Intrinsics
-from doorstate.simulation.scene import Box, Material
+from doorstate.simulation.camera import CameraPose, DepthCamera
+from doorstate.simulation.scene.box import Box, Material
 from doorstate.types import DepthImage, Part
 
 NO_BOX = -1
@@ -31,85 +29,8 @@ _EDGES = np.array(
 )
 
 
-class DepthCamera(FrozenModel):
-    """A pinhole depth camera; the defaults are the ASUS Xtion Pro as Gazebo's `openni_kinect` plugin simulates it.
-
-    Image 640x480, 60 degrees, valid strictly between 0.4 and 5.0 m (SIMULATION section 1.2). Pixels are square; the
-    centre of projection is the image's, unless it is given.
-    """
-
-    width: int = 640
-    height: int = 480
-    hfov_deg: float = 60.0
-    min_depth_m: float = 0.4
-    max_depth_m: float = 5.0
-    cx_px: float | None = None
-    cy_px: float | None = None
-
-    def intrinsics(self) -> Intrinsics:
-        """The pinhole of Gazebo: f = W / (2 tan(hfov / 2)), centre ((W - 1) / 2, (H - 1) / 2)."""
-        ideal = Intrinsics.from_hfov(self.width, self.height, math.radians(self.hfov_deg))
-        return replace(
-            ideal,
-            cx=ideal.cx if self.cx_px is None else self.cx_px,
-            cy=ideal.cy if self.cy_px is None else self.cy_px,
-        )
-
-    @model_serializer(mode="wrap")
-    def _omit_defaults(self, fields: SerializerFunctionWrapHandler) -> dict[str, float]:
-        # Manifests have no columns for what ordinary cameras do not have.
-        return {name: value for name, value in fields(self).items() if value is not None}
-
-
-CAMERAS = {
-    "xtion-gazebo": DepthCamera(),
-    "xtion-hw": DepthCamera(hfov_deg=58.0, min_depth_m=0.8, max_depth_m=3.5),
-}
-
-
-class CameraPose(NamedTuple):
-    """Where the camera is in the door frame; yaw about z, pitch about y, then roll about x, as in SDF.
-
-    Positive pitch looks down, positive roll turns the camera clockwise as seen from behind it.
-    """
-
-    x_m: float
-    y_m: float
-    z_m: float
-    yaw_rad: float
-    pitch_rad: float = 0.0
-    roll_rad: float = 0.0
-
-    @classmethod
-    def of_degrees(
-        cls, at_m: tuple[float, float, float], yaw: float, pitch: float, roll: float = 0.0
-    ) -> Self:
-        """A pose with its angles in degrees."""
-        return cls(*at_m, math.radians(yaw), math.radians(pitch), math.radians(roll))
-
-    def rotation(self) -> NDArray[np.float64]:
-        """R_door_camera, (3, 3); camera axes x forward, y left, z up."""
-        # math, not numpy: libm gives the same bits whatever SIMD the processor has.
-        cos_yaw, sin_yaw = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
-        cos_pitch, sin_pitch = math.cos(self.pitch_rad), math.sin(self.pitch_rad)
-        unrolled = np.array(
-            [
-                [cos_yaw * cos_pitch, -sin_yaw, cos_yaw * sin_pitch],
-                [sin_yaw * cos_pitch, cos_yaw, sin_yaw * sin_pitch],
-                [-sin_pitch, 0.0, cos_pitch],
-            ]
-        )
-        if not self.roll_rad:
-            return unrolled
-        cos_roll, sin_roll = math.cos(self.roll_rad), math.sin(self.roll_rad)
-        left, up = unrolled[:, 1], unrolled[:, 2]
-        return np.stack(
-            [unrolled[:, 0], cos_roll * left + sin_roll * up, cos_roll * up - sin_roll * left], axis=1
-        )
-
-
 class Render(NamedTuple):
-    """What the camera sees before its range is cut."""
+    """Depth, part and box of every pixel."""
 
     depth_m: DepthImage  # (H, W) z-depth, inf where nothing is hit
     part: NDArray[np.uint8]  # (H, W) doorstate.types.Part, NONE where nothing is hit
@@ -126,7 +47,7 @@ def render(boxes: Sequence[Box], pose: CameraPose, intrinsics: Intrinsics) -> Re
 
 
 def render_behind_glass(boxes: Sequence[Box], pose: CameraPose, intrinsics: Intrinsics) -> Render:
-    """As `render`, with all glass taken out: the opaque surface that a pixel would see through it."""
+    """Cast rays as `render` does, without boxes of glass: the opaque surface behind each pane."""
     opaque = [number for number, box in enumerate(boxes) if box.material != "glass"]
     return _render(boxes, opaque, pose, intrinsics)
 
@@ -134,10 +55,10 @@ def render_behind_glass(boxes: Sequence[Box], pose: CameraPose, intrinsics: Intr
 def incidence(
     rendered: Render, boxes: Sequence[Box], pose: CameraPose, intrinsics: Intrinsics
 ) -> NDArray[np.float32]:
-    """Angle between each pixel's ray and the normal of the face it hits, exact from the box.
+    """Return the angle between each pixel's ray and the normal of the face it hits, exact from the box.
 
     Args:
-        rendered: what `render` or `render_behind_glass` saw of the same boxes, cut or not.
+        rendered: result of `render` or `render_behind_glass` for the same boxes, before or after `cut_range`.
         boxes: the scene, in the door frame.
         pose: of the camera, in the door frame.
         intrinsics: of the camera.
@@ -148,12 +69,12 @@ def incidence(
     cosine = np.ones(rendered.box.shape)
     for number in np.unique(rendered.box[rendered.box != NO_BOX]).tolist():
         window = _window(boxes[number], pose, intrinsics)
-        seen = rendered.box[window.rows, window.columns] == number
+        visible = rendered.box[window.rows, window.columns] == number
         slabs = list(_slabs(window, intrinsics))
         enter = np.maximum(np.maximum(slabs[0][0], slabs[1][0]), slabs[2][0])
         for near, _, direction in slabs:
             # The face is the one through which the ray enters last.
-            hit = seen & (near == enter)
+            hit = visible & (near == enter)
             np.copyto(cosine[window.rows, window.columns], np.abs(direction), where=hit)
     left = (np.arange(intrinsics.width) - intrinsics.cx)[None, :] / intrinsics.fx
     up = (np.arange(intrinsics.height) - intrinsics.cy)[:, None] / intrinsics.fy
@@ -162,22 +83,22 @@ def incidence(
 
 
 def is_made_of(material: Material, rendered: Render, boxes: Sequence[Box]) -> NDArray[np.bool_]:
-    """Pixels (H, W) that see a box of this material."""
-    # The last entry is that of NO_BOX, which indexes from the end.
+    """Return the mask (H, W) of pixels that see a box of this material."""
+    # NO_BOX is -1 and so indexes the last entry.
     return np.array([*(box.material == material for box in boxes), False])[rendered.box]
 
 
 def cut_range(rendered: Render, camera: DepthCamera) -> Render:
-    """Depth is NaN, part NONE and box NO_BOX unless min < depth < max, both strict, as in the Gazebo plugin."""
+    """Set depth to NaN, part to NONE and box to NO_BOX unless min < depth < max, strictly, as in the Gazebo plugin."""
     with np.errstate(invalid="ignore"):
         valid = (rendered.depth_m > camera.min_depth_m) & (rendered.depth_m < camera.max_depth_m)
     return keep(rendered, valid)
 
 
 def keep(rendered: Render, valid: NDArray[np.bool_]) -> Render:
-    """Depth is NaN, part NONE and box NO_BOX where (H, W) is not valid."""
+    """Set depth to NaN, part to NONE and box to NO_BOX where the mask (H, W) is False."""
     lost = ~valid
-    # All bits set is Part.NONE as well as NO_BOX; a bitwise or is several times quicker than np.where.
+    # Part.NONE and NO_BOX have all bits set; a bitwise or is several times faster than np.where.
     return Render(
         np.where(valid, rendered.depth_m, np.float32(np.nan)),
         rendered.part | -lost.view(np.uint8),
@@ -186,7 +107,7 @@ def keep(rendered: Render, valid: NDArray[np.bool_]) -> Render:
 
 
 class _Window(NamedTuple):
-    """A box in the camera's frame, and the pixels that can see it."""
+    """The pixels that can see a box, and the box in the camera's frame."""
 
     rotation: NDArray[np.float64]  # R_box_camera
     origin: NDArray[np.float64]  # the camera in the box's frame
@@ -219,7 +140,7 @@ def _render(boxes: Sequence[Box], numbers: Sequence[int], pose: CameraPose, intr
 
 
 def _unhidden(window: _Window, depth: NDArray[np.float64]) -> _Window:
-    """The window without the rows and columns at its sides where everything is nearer than the box."""
+    """Return the window without the outer rows and columns where all pixels already hit something nearer."""
     farther = depth[window.rows, window.columns] > window.nearest_m * (1 - _ROUNDING)
     rows, columns = np.flatnonzero(farther.any(axis=1)), np.flatnonzero(farther.any(axis=0))
     if not len(rows):
@@ -245,7 +166,7 @@ def _cast_box(
         leave = np.minimum(leave, far)
     before = depth[window.rows, window.columns]
     hit = (enter <= leave) & (enter < before)
-    # A camera inside a box would enter at the near limit; our rooms have none.
+    # A camera inside a box would hit it at the near limit; no scene has such a camera.
     np.copyto(before, enter, where=hit)
     np.copyto(index[window.rows, window.columns], np.int16(number), where=hit)
 
@@ -253,18 +174,18 @@ def _cast_box(
 def _slabs(
     window: _Window, intrinsics: Intrinsics
 ) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]]:
-    """For each axis of the box: z-depth at the nearer and the farther plane, and the ray's direction along it."""
+    """Yield, for each axis of the box, z-depth at the near and the far plane and the ray's direction along the axis."""
     left = (
         -(np.arange(window.columns.start, window.columns.stop) - intrinsics.cx)[None, :] / intrinsics.fx
     )  # (1, w)
     up = -(np.arange(window.rows.start, window.rows.stop) - intrinsics.cy)[:, None] / intrinsics.fy  # (h, 1)
     for axis in range(3):
         direction = _direction(window.rotation[axis], left, up)
-        # A ray along a face divides by zero: +-inf is the right answer, and 0/0 (on the face) counts as a miss.
+        # A ray along a face divides by zero: +-inf is the right value, and 0/0 (on the face) counts as a miss.
         with np.errstate(divide="ignore", invalid="ignore"):
-            one = (-window.half[axis] - window.origin[axis]) / direction
-            other = (window.half[axis] - window.origin[axis]) / direction
-        yield np.minimum(one, other), np.maximum(one, other, out=other), direction
+            low = (-window.half[axis] - window.origin[axis]) / direction
+            high = (window.half[axis] - window.origin[axis]) / direction
+        yield np.minimum(low, high), np.maximum(low, high, out=high), direction
 
 
 def _direction(
@@ -284,17 +205,17 @@ def _pixel_window(
     half: NDArray[np.float64],
     intrinsics: Intrinsics,
 ) -> tuple[slice, slice, float]:
-    """Rows and columns that can see the box, and the depth of its nearest point."""
+    """Return rows and columns that can see the box, and the z-depth of its nearest point."""
     corners = (_CORNERS * half - origin) @ rotation  # (8, 3) in the camera's frame
     ahead = corners[:, 0] >= _NEAR_M
     if not ahead.any():
         return slice(0, 0), slice(0, 0), math.inf
     if not ahead.all():
-        # What is left of the box in front of the camera has its corners there, and on the edges that reach behind.
-        cut = _EDGES[ahead[_EDGES[:, 0]] != ahead[_EDGES[:, 1]]]
-        one, other = corners[cut[:, 0]], corners[cut[:, 1]]
-        share = (_NEAR_M - one[:, :1]) / (other[:, :1] - one[:, :1])
-        corners = np.concatenate([corners[ahead], one + share * (other - one)])
+        # Clip the box at the near plane: keep the corners ahead of it, and add those of the edges that cross it.
+        crossing = _EDGES[ahead[_EDGES[:, 0]] != ahead[_EDGES[:, 1]]]
+        start, end = corners[crossing[:, 0]], corners[crossing[:, 1]]
+        share = (_NEAR_M - start[:, :1]) / (end[:, :1] - start[:, :1])
+        corners = np.concatenate([corners[ahead], start + share * (end - start)])
     forward = np.maximum(corners[:, 0], _NEAR_M)
     u = intrinsics.cx - corners[:, 1] / forward * intrinsics.fx
     v = intrinsics.cy - corners[:, 2] / forward * intrinsics.fy

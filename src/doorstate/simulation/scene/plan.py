@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Boxes seen from above: which of them run into one another, and how far apart they are."""
+"""Collisions and distances of boxes, mostly in plan view."""
 
 from __future__ import annotations
 
@@ -9,57 +9,36 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from doorstate.simulation.scene import Box
+from doorstate.simulation.scene.box import Box
 
 TOLERANCE_M = 0.005  # a leaf's edge is bevelled by about as much as its corner would cut into the jamb
 
 
-def place(boxes: Sequence[Box], x_m: float, y_m: float, yaw_rad: float) -> list[Box]:
-    """Turn boxes about the z axis, then move them."""
-    cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
-    placed = []
-    for box in boxes:
-        x, y, z = box.center_m
-        center = (x_m + x * cos - y * sin, y_m + x * sin + y * cos, z)
-        placed.append(box._replace(center_m=center, yaw_rad=box.yaw_rad + yaw_rad))
-    return placed
-
-
-def mirror(boxes: Sequence[Box], x: bool = False, about_y_m: float | None = None) -> list[Box]:
-    """Boxes reflected at the plane x = 0, at the plane y = about_y_m, or at both."""
-    for_x, for_y = (-1.0 if x else 1.0), (1.0 if about_y_m is None else -1.0)
-    axis_y = about_y_m or 0.0
-    return [
-        box._replace(
-            center_m=(for_x * box.center_m[0], axis_y + for_y * (box.center_m[1] - axis_y), box.center_m[2]),
-            yaw_rad=for_x * for_y * box.yaw_rad,
-        )
-        for box in boxes
-    ]
-
-
 def collide(boxes: Sequence[Box], others: Sequence[Box], tolerance_m: float = TOLERANCE_M) -> bool:
-    """Whether a box reaches into one of the others by more than the tolerance (separating axes in plan, and height)."""
+    """Return True if a box overlaps one of the others by more than the tolerance.
+
+    Separating axis test in plan, and the overlap in height.
+    """
     if not boxes or not others:
         return False
     center, axes, half = _plans(boxes, 1)
     other_center, other_axes, other_half = _plans(others, 0)
     apart = other_center - center  # (N, M, 3)
     separated = np.abs(apart[..., 2]) > half[..., 2] + other_half[..., 2] - tolerance_m
-    # |cosine| between every axis of the one and every axis of the other: (N, M, 2, 2)
+    # |cosine| between every axis of one box and every axis of the other: (N, M, 2, 2)
     cosines = np.abs(np.einsum("...ix,...jx->...ij", axes, other_axes))
-    for own_axes, own, foreign, turned in (
+    for own_axes, own, opposite, rotated in (
         (axes, half, other_half, cosines),
         (other_axes, other_half, half, cosines.swapaxes(-1, -2)),
     ):
         away = np.abs(np.einsum("...ix,...x->...i", own_axes, apart[..., :2]))
-        reach = own[..., :2] + np.einsum("...ij,...j->...i", turned, foreign[..., :2])
+        reach = own[..., :2] + np.einsum("...ij,...j->...i", rotated, opposite[..., :2])
         separated |= (away > reach - tolerance_m).any(axis=-1)
     return bool((~separated).any())
 
 
 def distance_m(one: Box, other: Box) -> float:
-    """Shortest distance in plan between two boxes; 0 where they overlap there."""
+    """Return the shortest distance in plan between two boxes; 0 if they overlap in plan."""
     tall, tall_other = (box._replace(center_m=(*box.center_m[:2], 0.0)) for box in (one, other))
     if collide([tall], [tall_other], 0.0):
         return 0.0
@@ -73,7 +52,7 @@ def distance_m(one: Box, other: Box) -> float:
 
 
 def footprint(box: Box) -> list[tuple[float, float]]:
-    """The four corners in plan, in order around the box."""
+    """Return the four corners in plan, in order around the box."""
     cos, sin = math.cos(box.yaw_rad), math.sin(box.yaw_rad)
     halves = ((1, 1), (-1, 1), (-1, -1), (1, -1))
     sizes = [(a * box.size_m[0] / 2, b * box.size_m[1] / 2) for a, b in halves]
@@ -83,7 +62,7 @@ def footprint(box: Box) -> list[tuple[float, float]]:
 def _plans(
     boxes: Sequence[Box], axis: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Centres, unit axes and half sizes, with an axis put in for the other boxes."""
+    """Return centres, unit axes and half sizes, with an axis inserted to broadcast over the other boxes."""
     turns = [(math.cos(box.yaw_rad), math.sin(box.yaw_rad)) for box in boxes]
     axes = np.array([((cos, sin), (-sin, cos)) for cos, sin in turns])
     center = np.array([box.center_m for box in boxes])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where the robot stands: the half-ring of poses in front of the door."""
+"""The paper's half-ring of 1353 robot poses in front of the door."""
 
 from __future__ import annotations
 
@@ -8,7 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-HEADING_JITTER_DEG = 20.0  # both jambs in view in 96 % of the frames (SIMULATION section 1.4)
+from doorstate.errors import ConfigError
+
+HEADING_JITTER_DEG = 20.0  # both jambs in view in 96 % of the frames (docs/data-card.md)
 _INNER_CELLS, _OUTER_CELLS = 15, 35  # 1.5 and 3.5 m
 _WALL_CELLS = 6  # 0.6 m off the wall
 
@@ -29,10 +31,11 @@ class Position(NamedTuple):
 
 
 def half_ring() -> list[Position]:
-    """The 1353 positions of preset `ogurob`, by row then column.
+    """Return the 1353 positions of the paper, by row, then column.
 
-    Integers i, j with 225 <= i^2 + j^2 <= 1225 and j >= 6, without the off-axis points at exactly 3.5 m. That is what a
-    grid accumulated in float32 keeps, and it gives the paper's count exactly (a hypothesis: SIMULATION section 1.4).
+    Integers i, j with 225 <= i^2 + j^2 <= 1225 and j >= 6, without the off-axis points at exactly 3.5 m. A grid
+    accumulated in float32 leaves those out too, and the count is then exactly the paper's. The lattice is inferred from
+    that count (docs/data-card.md).
     """
     positions = []
     for j in range(_WALL_CELLS, _OUTER_CELLS + 1):
@@ -45,16 +48,20 @@ def half_ring() -> list[Position]:
 
 
 def reduced_ring(count: int) -> list[int]:
-    """Indices into `half_ring()` of `count` positions, spread over bearing and distance.
+    """Return indices into `half_ring()` of `count` positions, spread over bearing and distance.
 
-    Every k-th position of the ring read sector by sector (30 degrees), near to far within each.
+    Every k-th position of the ring sorted by sector (30 degrees), near to far within each.
 
     Raises:
-        ValueError: more positions than there are, or none.
+        ConfigError: more positions than there are, or none.
     """
     positions = half_ring()
     if not 1 <= count <= len(positions):
-        raise ValueError(f"there are {len(positions)} positions, not {count}")
+        raise ConfigError(
+            f"there are {len(positions)} positions, not {count}",
+            field="poses",
+            expected=f"1 to {len(positions)}",
+        )
     order = sorted(
         range(len(positions)),
         key=lambda k: (_sector(positions[k]), math.hypot(*positions[k]), positions[k].column),
@@ -67,7 +74,6 @@ def _sector(position: Position) -> int:
     return int(math.degrees(math.atan2(position.row, position.column)) // 30)
 
 
-def draw_heading_rad(position: Position, seed: int, index: int) -> float:
-    """Yaw that looks at the door's middle, turned by U(-20, 20) degrees; the same for the three states of a pose."""
-    jitter_deg = np.random.default_rng([seed, index]).uniform(-HEADING_JITTER_DEG, HEADING_JITTER_DEG)
-    return math.atan2(-position.row, -position.column) + math.radians(jitter_deg)
+def draw_heading_offset_deg(seed: int, index: int) -> float:
+    """Draw the angle, U(-20, 20) degrees, from the bearing to the door's middle; one for all states of a pose."""
+    return float(np.random.default_rng([seed, index]).uniform(-HEADING_JITTER_DEG, HEADING_JITTER_DEG))

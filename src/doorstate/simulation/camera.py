@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Depth cameras and their poses."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from doorstate._models import FrozenModel
+from doorstate.io.camera import Intrinsics
+
+
+class DepthCamera(FrozenModel):
+    """A pinhole depth camera; the defaults are the ASUS Xtion Pro as Gazebo's `openni_kinect` plugin simulates it.
+
+    Image 640 x 480, 60 degrees, valid strictly between 0.4 and 5.0 m. Pixels are square; the centre of projection is
+    the image's unless `cx_px` and `cy_px` are set.
+    """
+
+    width: int = 640
+    height: int = 480
+    hfov_deg: float = 60.0
+    min_depth_m: float = 0.4
+    max_depth_m: float = 5.0
+    cx_px: float | None = None
+    cy_px: float | None = None
+
+    def intrinsics(self) -> Intrinsics:
+        """Return the pinhole model of Gazebo: f = W / (2 tan(hfov / 2)), centre ((W - 1) / 2, (H - 1) / 2)."""
+        ideal = Intrinsics.from_hfov(self.width, self.height, math.radians(self.hfov_deg))
+        return replace(
+            ideal,
+            cx=ideal.cx if self.cx_px is None else self.cx_px,
+            cy=ideal.cy if self.cy_px is None else self.cy_px,
+        )
+
+
+CAMERAS = {
+    "xtion-gazebo": DepthCamera(),
+    "xtion-hw": DepthCamera(hfov_deg=58.0, min_depth_m=0.8, max_depth_m=3.5),
+}
+
+
+class CameraPose(NamedTuple):
+    """A camera pose in the door frame; yaw about z, pitch about y, then roll about x, as in SDF.
+
+    Positive pitch looks down, positive roll turns the camera clockwise as seen from behind it.
+    """
+
+    x_m: float
+    y_m: float
+    z_m: float
+    yaw_rad: float
+    pitch_rad: float = 0.0
+    roll_rad: float = 0.0
+
+    @classmethod
+    def from_degrees(
+        cls, position_m: tuple[float, float, float], yaw_deg: float, pitch_deg: float, roll_deg: float = 0.0
+    ) -> Self:
+        """Return a pose from angles in degrees."""
+        return cls(*position_m, math.radians(yaw_deg), math.radians(pitch_deg), math.radians(roll_deg))
+
+    def rotation(self) -> NDArray[np.float64]:
+        """Return R_door_camera, (3, 3); camera axes x forward, y left, z up."""
+        # math, not numpy: libm gives the same bits on processors with different SIMD instructions.
+        cos_yaw, sin_yaw = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
+        cos_pitch, sin_pitch = math.cos(self.pitch_rad), math.sin(self.pitch_rad)
+        unrolled = np.array(
+            [
+                [cos_yaw * cos_pitch, -sin_yaw, cos_yaw * sin_pitch],
+                [sin_yaw * cos_pitch, cos_yaw, sin_yaw * sin_pitch],
+                [-sin_pitch, 0.0, cos_pitch],
+            ]
+        )
+        if not self.roll_rad:
+            return unrolled
+        cos_roll, sin_roll = math.cos(self.roll_rad), math.sin(self.roll_rad)
+        left, up = unrolled[:, 1], unrolled[:, 2]
+        return np.stack(
+            [unrolled[:, 0], cos_roll * left + sin_roll * up, cos_roll * up - sin_roll * left], axis=1
+        )

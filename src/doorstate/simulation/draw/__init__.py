@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Random scenes, viewpoints and openings, drawn from the ranges of the data card."""

@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Upright boxes, the only shape of the simulator, and rigid motions of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Literal, NamedTuple
+
+from doorstate.types import Part
+
+Material = Literal["matte", "gloss", "dark", "glass"]
+"""How a surface returns a depth camera's light (simulation.noise.materials)."""
+
+
+class Box(NamedTuple):
+    """An upright box; `center_m` and `size_m` are (x, y, z), `yaw_rad` turns it about z."""
+
+    part: Part
+    center_m: tuple[float, float, float]
+    size_m: tuple[float, float, float]
+    yaw_rad: float = 0.0
+    material: Material = "matte"
+
+
+def place(boxes: Sequence[Box], x_m: float, y_m: float, yaw_rad: float) -> list[Box]:
+    """Rotate boxes about the z axis, then translate them."""
+    cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
+    placed = []
+    for box in boxes:
+        x, y, z = box.center_m
+        center = (x_m + x * cos - y * sin, y_m + x * sin + y * cos, z)
+        placed.append(box._replace(center_m=center, yaw_rad=box.yaw_rad + yaw_rad))
+    return placed
+
+
+def mirror(boxes: Sequence[Box], x: bool = False, about_y_m: float | None = None) -> list[Box]:
+    """Reflect boxes at the plane x = 0, at the plane y = about_y_m, or at both."""
+    sign_x, sign_y = (-1.0 if x else 1.0), (1.0 if about_y_m is None else -1.0)
+    axis_y = about_y_m or 0.0
+    return [
+        box._replace(
+            center_m=(
+                sign_x * box.center_m[0],
+                axis_y + sign_y * (box.center_m[1] - axis_y),
+                box.center_m[2],
+            ),
+            yaw_rad=sign_x * sign_y * box.yaw_rad,
+        )
+        for box in boxes
+    ]

@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Parameters of a door and of its opening; boxes are in `door_boxes`."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from doorstate._models import FrozenModel
+from doorstate.simulation.scene.handle import Handle
+
+Hinge = Literal["left", "right"]
+Swing = Literal["away", "towards"]
+DoorKind = Literal["single", "double_equal", "double_unequal", "sliding", "glazed", "full_glass"]
+
+
+class Door(FrozenModel):
+    """A door in its wall; the defaults are the door of the paper's presets.
+
+    The paper states no sizes. An opening of 0.90 x 2.10 m, a wall of 0.15 m and a leaf of 0.04 m are usual in Turkey
+    and assumed here (docs/data-card.md). `hinge` and `swing` describe the active leaf. For a sliding door `hinge` is
+    the side it opens to, and `swing` the wall face it runs along.
+    """
+
+    opening_width_m: float = 0.90
+    opening_height_m: float = 2.10
+    hinge: Hinge = "left"
+    swing: Swing = "towards"
+    leaf_thickness_m: float = 0.04
+    leaf_gap_m: float = 0.003  # to the jambs and the head
+    leaf_floor_gap_m: float = 0.006
+    wall_thickness_m: float = 0.15
+    wall_height_m: float = 2.6
+    wall_half_length_m: float = 6.0
+    jamb_thickness_m: float = 0.03
+    casing_width_m: float = 0.06
+    casing_thickness_m: float = 0.015
+    stop_width_m: float = 0.012  # by which the stop projects from the jamb
+    stop_depth_m: float = 0.03
+    floor_size_m: float = 16.0
+    kind: DoorKind = "single"
+    leaf_recess_m: float = 0.0  # of the leaf's face behind the wall's; negative in front of it
+    hinge_offset_m: float = 0.0  # of the hinge pin in front of the leaf's face
+    active_share: float = 1.0  # of the total leaf width
+    pane_bottom_m: float | None = None  # glazed leaves only
+    threshold_m: float = 0.0
+    handle: Handle | None = None
+
+    @property
+    def is_double(self) -> bool:
+        """True for a door with a second, passive leaf."""
+        return self.kind in ("double_equal", "double_unequal")
+
+    @property
+    def is_sliding(self) -> bool:
+        """True for a door that opens by a share of its width, not by an angle."""
+        return self.kind == "sliding"
+
+
+class Opening(FrozenModel):
+    """State of the leaves: angles of the active and the passive leaf, or the open share of a sliding door's width."""
+
+    angle_deg: float = 0.0
+    passive_angle_deg: float = 0.0
+    share: float = 0.0

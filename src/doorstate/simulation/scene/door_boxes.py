@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Boxes of a door for one opening, in the door frame.
+
+A door is built with the hinge on the right and the leaf towards the robot, then mirrored to its hinge and swing.
+"""
+
+from __future__ import annotations
+
+import math
+
+from doorstate.simulation.scene.box import Box, mirror, place
+from doorstate.simulation.scene.door import Door, Opening
+from doorstate.simulation.scene.frame import frame_boxes, wall_boxes
+from doorstate.simulation.scene.leaf import hinged_leaf, leaf_widths_m, sliding_leaf
+
+
+def door_boxes(door: Door, opening: Opening) -> list[Box]:
+    """Return wall, frame and leaves; the wall comes first and the leaves last."""
+    return [*fixed_boxes(door), *leaf_boxes(door, opening)]
+
+
+def fixed_boxes(door: Door) -> list[Box]:
+    """Return the parts that do not move: wall, frame, threshold and track."""
+    boxes = [*wall_boxes(door), *frame_boxes(door)]
+    return _to_hinge_and_swing([box for box in boxes if min(box.size_m) > 0], door)
+
+
+def leaf_boxes(door: Door, opening: Opening) -> list[Box]:
+    """Return the leaves with their handles."""
+    if door.is_sliding:
+        leaf = place(sliding_leaf(door), -opening.share * door.opening_width_m, 0.0, 0.0)
+        return _to_hinge_and_swing(leaf, door)
+    active_m, passive_m = leaf_widths_m(door)
+    boxes = turn_leaf(door, hinged_leaf(door, active_m, door.handle), opening.angle_deg)
+    if door.is_double:
+        passive = hinged_leaf(door, passive_m, None)
+        boxes += mirror(turn_leaf(door, passive, opening.passive_angle_deg), x=True)
+    return _to_hinge_and_swing(boxes, door)
+
+
+def turn_leaf(door: Door, leaf: list[Box], angle_deg: float) -> list[Box]:
+    """Move boxes from a leaf's frame to the door frame, for a hinge on the right and a swing towards the robot."""
+    x = -door.opening_width_m / 2 + door.leaf_gap_m
+    return place(leaf, x, door.hinge_offset_m - door.leaf_recess_m, math.radians(angle_deg))
+
+
+def _to_hinge_and_swing(boxes: list[Box], door: Door) -> list[Box]:
+    middle = -door.wall_thickness_m / 2
+    return mirror(boxes, x=door.hinge == "left", about_y_m=middle if door.swing == "away" else None)

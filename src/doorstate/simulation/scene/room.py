@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Rooms before and behind a wall: side walls, a far wall, floor and ceiling."""
+
+from __future__ import annotations
+
+from doorstate._models import FrozenModel
+from doorstate.simulation.scene.box import Box
+from doorstate.types import Part
+
+_WALL_M = 0.1
+_FLOOR_M = 0.1
+_LONG_M = 8.0  # length of walls without an end: beyond the camera's range
+
+
+class Space(FrozenModel):
+    """Distances from the middle of the door or feature to the inner faces of the room's walls; None is open."""
+
+    left_m: float | None = None
+    right_m: float | None = None
+    depth_m: float | None = None
+
+
+def space_boxes(space: Space, wall_y_m: float, side: int, height_m: float) -> list[Box]:
+    """Return the walls of a space that begins at the wall face `wall_y_m`, towards +y (side 1) or -y (side -1)."""
+    depth = space.depth_m or _LONG_M
+    left, right = space.left_m or _LONG_M, space.right_m or _LONG_M
+    middle_y, z = wall_y_m + side * depth / 2, height_m / 2
+    boxes = []
+    if space.left_m:
+        boxes.append(Box(Part.WALL, (left + _WALL_M / 2, middle_y, z), (_WALL_M, depth, height_m)))
+    if space.right_m:
+        boxes.append(Box(Part.WALL, (-right - _WALL_M / 2, middle_y, z), (_WALL_M, depth, height_m)))
+    if space.depth_m:
+        y = wall_y_m + side * (depth + _WALL_M / 2)
+        boxes.append(Box(Part.WALL, ((left - right) / 2, y, z), (left + right, _WALL_M, height_m)))
+    return boxes
+
+
+def floor_box(size_m: float) -> Box:
+    """Return a square floor."""
+    return Box(Part.FLOOR, (0.0, 0.0, -_FLOOR_M / 2), (size_m, size_m, _FLOOR_M))
+
+
+def ceiling_box(height_m: float, size_m: float) -> Box:
+    """Return a square ceiling over both spaces."""
+    return Box(Part.CEILING, (0.0, 0.0, height_m + _WALL_M / 2), (size_m, size_m, _WALL_M))

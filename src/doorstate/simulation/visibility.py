@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Pixels that see a door's opening, and images that look the same."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from doorstate.io.camera import Intrinsics
+from doorstate.io.depth import depth_to_points
+from doorstate.simulation.camera import CameraPose
+from doorstate.simulation.frames import level
+from doorstate.types import DepthImage
+
+SAME_IMAGE_M = 1e-4
+
+
+def same_image(depth_m: DepthImage, reference_m: DepthImage) -> bool:
+    """Return True if two depth images agree to 0.1 mm and are NaN in the same pixels."""
+    measured = ~np.isnan(depth_m)
+    return bool(
+        np.array_equal(measured, ~np.isnan(reference_m))
+        and np.abs(depth_m[measured] - reference_m[measured]).max(initial=0.0) <= SAME_IMAGE_M
+    )
+
+
+def opening_depth_m(pose: CameraPose, intrinsics: Intrinsics, width_m: float, height_m: float) -> DepthImage:
+    """Return the z-depth at which rays cross an opening, a rectangle on the robot's wall face.
+
+    Args:
+        pose: of the camera in the door frame.
+        intrinsics: of the camera.
+        width_m: of the opening.
+        height_m: of the opening.
+
+    Returns:
+        (H, W) float32 metres, NaN for rays that miss the opening.
+    """
+    # The point of a pixel at unit depth, in the gravity-aligned sensor frame, is the ray's direction.
+    unit = np.ones((intrinsics.height, intrinsics.width), np.float32)
+    ray = level(depth_to_points(unit, intrinsics), pose.pitch_rad, pose.roll_rad)
+    ray_y = math.sin(pose.yaw_rad) * ray[..., 0] + math.cos(pose.yaw_rad) * ray[..., 1]
+    ray_x = math.cos(pose.yaw_rad) * ray[..., 0] - math.sin(pose.yaw_rad) * ray[..., 1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        reach = -pose.y_m / ray_y
+        inside = np.abs(pose.x_m + reach * ray_x) < width_m / 2
+        z = pose.z_m + reach * ray[..., 2]
+        inside &= (reach > 0) & (z > 0) & (z < height_m)
+    return np.where(inside, reach, np.float32(np.nan))
+
+
+def looks_into(depth_m: DepthImage, opening_m: DepthImage) -> NDArray[np.bool_]:
+    """Return the mask (H, W) of pixels whose ray crosses an opening and hits nothing in front of it.
+
+    Args:
+        depth_m: (H, W) depth before the camera's range is cut.
+        opening_m: result of `opening_depth_m`.
+    """
+    mask: NDArray[np.bool_] = depth_m >= opening_m - SAME_IMAGE_M
+    return mask
