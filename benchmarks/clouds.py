@@ -14,7 +14,8 @@ from doorstate.dataset.store import open_dataset
 from doorstate.errors import ConfigError
 from doorstate.inference.reference_clouds import LabelledClouds, reference_clouds, reference_rows
 from doorstate.simulation.frames import Frame, replay
-from doorstate.simulation.generate import PRESETS, SampleRow, draw_pose, pose_indices
+from doorstate.simulation.presets import PRESETS, draw_rows
+from doorstate.simulation.row import Row
 from doorstate.types import Points
 
 
@@ -28,7 +29,7 @@ class Clouds(LabelledClouds):
 
 def raw_cloud() -> Points:
     """(480, 640, 3) organized cloud in metres as the simulated depth camera gives it, NaN where nothing is."""
-    return replay(draw_pose(PRESETS["ogurob"], 0, pose_indices(3)[1])[1]).points
+    return replay(draw_rows(PRESETS["ogurob"], 0, PRESETS["ogurob"].indices(3)[1])[1]).points
 
 
 def raw_clouds(count: int) -> list[Points]:
@@ -62,7 +63,7 @@ def dataset_clouds(folder: Path, count: int, num_points: int) -> Clouds:
     return Clouds(np.array(dataset.clouds[chosen, :num_points]), dataset.labels[chosen])
 
 
-def comparison_frames(count: int, progress: Progress) -> Iterator[tuple[SampleRow, Frame]]:
+def comparison_frames(count: int, progress: Progress) -> Iterator[tuple[Row, Frame]]:
     """Doors that no weights were trained on, as the camera sees them."""
     for done, row in enumerate(reference_rows(count)):
         progress(done, count)

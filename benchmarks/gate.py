@@ -16,10 +16,10 @@ from doorstate.evaluation.table import Table
 from doorstate.inference.network_predictor import NetworkPredictor
 from doorstate.inference.predictor import Predictor
 from doorstate.simulation.frames import Frame, replay
-from doorstate.simulation.generate import SampleRow
+from doorstate.simulation.row import Row
 from doorstate.types import Part, Points
 
-Fault = Callable[[SampleRow, Frame, np.random.Generator], Points]
+Fault = Callable[[Row, Frame, np.random.Generator], Points]
 
 
 def without(cloud: Points, missing: NDArray[np.bool_]) -> Points:
@@ -29,7 +29,7 @@ def without(cloud: Points, missing: NDArray[np.bool_]) -> Points:
     return cut
 
 
-def glass(row: SampleRow, frame: Frame) -> Points:
+def glass(row: Row, frame: Frame) -> Points:
     """The frame as if the leaf, and the leaf's place in its frame, gave no return."""
     shut = replay(row.model_copy(update={"opening_angle_deg": 0.0}))
     return without(frame.points, (shut.full.part == Part.LEAF) | (frame.full.part == Part.LEAF))
@@ -38,7 +38,7 @@ def glass(row: SampleRow, frame: Frame) -> Points:
 def _band(first: float, last: float, axis: int) -> Fault:
     """Loses what is between two shares of the image's height (axis 0) or width (axis 1)."""
 
-    def fault(row: SampleRow, frame: Frame, generator: np.random.Generator) -> Points:
+    def fault(row: Row, frame: Frame, generator: np.random.Generator) -> Points:
         shape = frame.points.shape[:2]
         place = np.indices(shape)[axis] / shape[axis]
         return without(frame.points, (place >= first) & (place < last))
@@ -49,7 +49,7 @@ def _band(first: float, last: float, axis: int) -> Fault:
 def _dropout(share: float, columns: bool) -> Fault:
     """Loses a share of all pixels, or of all columns."""
 
-    def fault(row: SampleRow, frame: Frame, generator: np.random.Generator) -> Points:
+    def fault(row: Row, frame: Frame, generator: np.random.Generator) -> Points:
         height, width = frame.points.shape[:2]
         lost = generator.random(width if columns else (height, width)) < share
         return without(frame.points, np.broadcast_to(lost, (height, width)))

@@ -15,9 +15,10 @@ from benchmarks.store import Group
 from doorstate._jobs import Progress
 from doorstate.evaluation.table import Table
 from doorstate.io.camera import Intrinsics
+from doorstate.simulation.camera import CameraPose
 from doorstate.simulation.noise.models import SENSORS, SensorModel, distort
+from doorstate.simulation.render import incidence, is_made_of, render, render_behind_glass
 from doorstate.simulation.scene import Box, Material
-from doorstate.simulation.sensor import CameraPose, incidence, is_made_of, render, render_behind_glass
 from doorstate.types import DepthImage, Part
 
 DEPTHS_M = (1.0, 2.0, 3.0, 3.5, 5.0)

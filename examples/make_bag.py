@@ -18,8 +18,9 @@ import numpy as np
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
-from doorstate.simulation.scene import Door, build_scene
-from doorstate.simulation.sensor import CameraPose, DepthCamera, cut_range, render
+from doorstate.simulation.camera import CameraPose, DepthCamera
+from doorstate.simulation.render import cut_range, render
+from doorstate.simulation.scene import Door, Opening, Scene, scene_boxes
 
 CAMERA = DepthCamera(width=320, height=240)
 STANDS_AT = CameraPose(x_m=-0.3, y_m=2.4, z_m=1.0, yaw_rad=math.radians(-83))  # the wall is at y = 0
@@ -35,7 +36,7 @@ def opening_angle_deg(time_s: float) -> float:
 
 def see(angle_deg: float) -> np.ndarray:
     """(H, W) 16-bit millimetres, 0 where nothing was measured."""
-    scene = build_scene(Door(), math.radians(angle_deg))
+    scene = scene_boxes(Scene(door=Door(), has_ceiling=False), Opening(angle_deg=angle_deg))
     depth_m = cut_range(render(scene, STANDS_AT, CAMERA.intrinsics()), CAMERA).depth_m
     return np.nan_to_num(depth_m * 1000).round().astype("<u2")
 

@@ -19,12 +19,11 @@ from doorstate.dataset.prepare import Preparation, prepare_dataset
 from doorstate.dataset.store import PreparedDataset
 from doorstate.networks import create_network
 from doorstate.networks.weights import WeightsCard, save_weights
+from doorstate.simulation.camera import DepthCamera
 from doorstate.simulation.frames import Frame, replay
-from doorstate.simulation.generate import PRESETS, draw_pose
-from doorstate.simulation.run import simulate_dataset
-from doorstate.simulation.scene_rows import SCENE_PRESETS
-from doorstate.simulation.sensor import DepthCamera
-from doorstate.simulation.settings import SceneSettings, SimulationSettings
+from doorstate.simulation.presets import PRESETS, draw_rows
+from doorstate.simulation.settings import SimulationSettings
+from doorstate.simulation.writer import simulate_dataset
 
 SMALL_POINTS = 160
 Run = Callable[..., tuple[int, str, str]]
@@ -62,7 +61,7 @@ def small_dataset(simulated_folder: Path, tmp_path_factory: pytest.TempPathFacto
 @pytest.fixture(scope="session")
 def frames() -> list[Frame]:
     """A closed, a semi-open and an open door from one pose."""
-    return [replay(row) for row in draw_pose(PRESETS["ogurob"], 3, 700)]
+    return [replay(row) for row in draw_rows(PRESETS["ogurob"], 3, 700)]
 
 
 @pytest.fixture(scope="session")
@@ -81,8 +80,8 @@ def more_dataset(tmp_path_factory: pytest.TempPathFactory) -> PreparedDataset:
 
 def _scenes(folder: Path, preset: str, seed: int, scenes: int) -> PreparedDataset:
     """Scenes seen by a small camera, simulated and prepared below `folder`."""
-    small = SCENE_PRESETS[preset].model_copy(update={"camera": DepthCamera(width=160, height=120)})
-    simulate_dataset(folder / preset, SceneSettings(preset=small, seed=seed, scenes=scenes), workers=1)
+    small = PRESETS[preset].model_copy(update={"camera": DepthCamera(width=160, height=120)})
+    simulate_dataset(folder / preset, SimulationSettings(preset=small, seed=seed, poses=scenes), workers=1)
     return prepare_dataset(
         Preparation(folder / preset, CloudSpec(num_points=SMALL_POINTS)), folder / f"{preset}-160", workers=1
     ).dataset

@@ -18,9 +18,10 @@ pytest.importorskip("rosbags")
 
 from doorstate.io.pcd import write_pcd
 from doorstate.io.readers import read_cloud
-from doorstate.simulation.generate import PRESETS, simulate_pose
-from doorstate.simulation.run import simulate_dataset
+from doorstate.simulation.generate import simulate_rows
+from doorstate.simulation.presets import PRESETS
 from doorstate.simulation.settings import SimulationSettings
+from doorstate.simulation.writer import simulate_dataset
 from doorstate.types import STATES
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
@@ -88,7 +89,7 @@ def test_depth_image_tells_the_angle(tmp_path: Path) -> None:
     (tmp_path / "camera.json").write_text(json.dumps(vars(lens)))
     said = example("depth_image", picture, tmp_path / "camera.json")
     found = re.fullmatch(r"measured: \d+% of the pixels\nsemi_open, opened by (\d+) degrees\n", said)
-    rows, _ = simulate_pose(preset, 3, int(picture.stem[1:5]))
+    rows, _ = simulate_rows(preset, 3, int(picture.stem[1:5]))
     assert found
     assert float(found[1]) == pytest.approx(rows[STATES.index("semi_open")].opening_angle_deg, abs=3)
 

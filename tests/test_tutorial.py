@@ -18,9 +18,9 @@ pytest.importorskip("rosbags")
 
 from doorstate.io.pcd import write_pcd
 from doorstate.io.readers import read_cloud
-from doorstate.simulation.generate import PRESETS
-from doorstate.simulation.run import simulate_dataset
+from doorstate.simulation.presets import PRESETS
 from doorstate.simulation.settings import SimulationSettings
+from doorstate.simulation.writer import simulate_dataset
 
 ROOT = Path(__file__).resolve().parents[1]
 TUTORIAL = (ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8")

@@ -18,7 +18,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from doorstate.io.pcd import write_pcd
-from doorstate.simulation.generate import PRESETS, simulate_pose
+from doorstate.simulation.generate import simulate_rows
+from doorstate.simulation.presets import PRESETS
 from doorstate.types import STATES
 
 REPOSITORY = Path(__file__).resolve().parents[1]
@@ -31,7 +32,7 @@ def main() -> None:
         folder = Path(name)
         print("building wheel and sdist", flush=True)
         _timed([sys.executable, "-m", "build", "--outdir", folder, REPOSITORY])
-        _, frames = simulate_pose(PRESETS["ogurob"], seed=3, index=PLAIN_POSE)
+        _, frames = simulate_rows(PRESETS["ogurob"], seed=3, index=PLAIN_POSE)
         clouds = {state: folder / f"{state}.pcd" for state in STATES}
         for path, frame in zip(clouds.values(), frames, strict=True):
             write_pcd(path, frame.points)

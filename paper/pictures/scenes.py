@@ -15,8 +15,10 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from doorstate.simulation.frames import Frame
-from doorstate.simulation.scene_rows import SCENE_PRESETS, SceneRow, simulate_scene
-from doorstate.simulation.sensor import is_made_of, render
+from doorstate.simulation.generate import simulate_rows
+from doorstate.simulation.presets import PRESETS
+from doorstate.simulation.render import is_made_of, render
+from doorstate.simulation.row import Row
 from doorstate.simulation.shading import shade
 from doorstate.types import STATES
 
@@ -27,7 +29,7 @@ WIDTH, HEIGHT, GAP, HEADING = 213, 160, 5, 26
 GLASS = np.array([150, 205, 225])
 
 
-def picture(row: SceneRow, frame: Frame) -> Image.Image:
+def picture(row: Row, frame: Frame) -> Image.Image:
     """A sample as the eye sees it."""
     intrinsics, boxes = row.camera.intrinsics(), row.boxes()
     shaded = shade(frame.full, intrinsics).astype(np.float64)
@@ -41,7 +43,7 @@ def lines(preset: str) -> dict[str, list[Image.Image]]:
     """The first samples of each kind, as many as a line holds; what is occluded is that of the closed door."""
     found = defaultdict(list)
     for index in range(SCENES):
-        rows, frames = simulate_scene(SCENE_PRESETS[preset], 0, index)  # type: ignore[index]
+        rows, frames = simulate_rows(PRESETS[preset], 0, index)  # type: ignore[index]
         line = found[getattr(rows[0], KINDS[preset])]
         if len(line) < COLUMNS:
             line += [picture(*each) for each in zip(rows, frames, strict=True)]

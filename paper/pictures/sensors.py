@@ -6,7 +6,6 @@ python tools/sensor_figure.py docs/images/sensors.png
 
 from __future__ import annotations
 
-import math
 import sys
 from dataclasses import replace
 
@@ -17,14 +16,15 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from doorstate.io.depth import depth_to_points
-from doorstate.simulation.noise.models import SENSORS, apply
-from doorstate.simulation.scene import Door, build_scene
-from doorstate.simulation.sensor import CameraPose, render_behind_glass
+from doorstate.simulation.camera import CameraPose
+from doorstate.simulation.noise.models import SENSORS, sense
+from doorstate.simulation.render import render_behind_glass
+from doorstate.simulation.scene import Door, Opening, Scene, scene_boxes
 from doorstate.types import DepthImage
 
-HALF_OPEN = build_scene(Door(hinge="right"), math.radians(50))
-CLOSED = build_scene(Door(), 0.0)
-BESIDE = CameraPose.of_degrees((0.5, 2.2, 1.1), -103.0, 0.0)
+HALF_OPEN = scene_boxes(Scene(door=Door(hinge="right"), has_ceiling=False), Opening(angle_deg=50))
+CLOSED = scene_boxes(Scene(door=Door(), has_ceiling=False), Opening())
+BESIDE = CameraPose.from_degrees((0.5, 2.2, 1.1), -103.0, 0.0)
 DISTANCES_M = (1.2, 2.2, 3.3)
 DRAWN = {"d435": "#e08214", "xtion": "#2166ac", "none": "black"}
 LOST = "#f4a6c0"
@@ -34,12 +34,12 @@ def measured(sensor: str, opened: bool, pose: CameraPose) -> DepthImage:
     """Depth of the door by this sensor."""
     model, boxes = SENSORS[sensor], HALF_OPEN if opened else CLOSED
     seen = render_behind_glass(boxes, pose, model.camera.intrinsics())
-    return apply(model, seen, boxes, pose, model.camera, 1).depth_m
+    return sense(model, seen, boxes, pose, model.camera, 1).depth_m
 
 
 def section(sensor: str, distance_m: float) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Along the wall, and towards the robot, in metres: a row of pixels 1.2 m above the floor."""
-    depth_m = measured(sensor, False, CameraPose.of_degrees((0.0, distance_m, 1.2), -90.0, 0.0))
+    depth_m = measured(sensor, False, CameraPose.from_degrees((0.0, distance_m, 1.2), -90.0, 0.0))
     pinhole = SENSORS[sensor].camera.intrinsics()
     row = round(pinhole.cy)
     points = depth_to_points(depth_m[row : row + 1], replace(pinhole, height=1, cy=pinhole.cy - row))[0]

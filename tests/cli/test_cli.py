@@ -112,7 +112,7 @@ def test_interrupt_is_exit_code_130(run: Run, monkeypatch: pytest.MonkeyPatch, t
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("doorstate.simulation.run.simulate_dataset", interrupted)
+    monkeypatch.setattr("doorstate.simulation.writer.simulate_dataset", interrupted)
     code, _, err = run("simulate", "--out", tmp_path / "x", "--poses", 1)
     assert code == 130  # some versions of typer handle the key themselves
     assert "Traceback" not in err

@@ -13,7 +13,7 @@ from PIL import Image
 
 from doorstate._files import write_csv
 from doorstate.simulation.frames import replay
-from doorstate.simulation.generate import PRESETS, draw_pose
+from doorstate.simulation.presets import PRESETS, draw_rows
 from doorstate.types import ABSTAINED
 from tests.cli.helpers import Run, check_error
 from tests.headless_chromium import open_browser_page
@@ -27,7 +27,7 @@ def recordings(tmp_path_factory: pytest.TempPathFactory) -> Path:
     camera = {"fx": "554.3", "fy": "554.3", "cx": "319.5", "cy": "239.5", "depth_unit_m": "0.001"}
     rows = []
     for pose, door in ((700, "oak"), (300, "glass front")):
-        for sample in draw_pose(PRESETS["ogurob"], 3, pose):
+        for sample in draw_rows(PRESETS["ogurob"], 3, pose):
             frame = replay(sample)
             name = f"{pose}_{sample.state}.png"
             depth_mm = np.nan_to_num(frame.cut.depth_m * 1000).astype(np.uint16)

@@ -22,7 +22,7 @@ from doorstate.clouds.sampling import bucket_farthest_points, farthest_point_ind
 from doorstate.io.camera import Intrinsics
 from doorstate.io.depth import depth_to_points
 from doorstate.simulation.frames import replay
-from doorstate.simulation.generate import PRESETS, draw_pose
+from doorstate.simulation.presets import PRESETS, draw_rows
 from doorstate.types import Indices, Points
 
 GAZEBO = Path(__file__).resolve().parents[1] / "fixtures" / "gazebo"
@@ -90,7 +90,7 @@ def gazebo_cloud(number: int) -> Points:
 
 def simulated_cloud(index: int, count: int) -> Points:
     return prepare_cloud(
-        replay(draw_pose(PRESETS["ogurob"], 0, index)[1]).points, CloudSpec(num_points=count)
+        replay(draw_rows(PRESETS["ogurob"], 0, index)[1]).points, CloudSpec(num_points=count)
     ).points
 
 

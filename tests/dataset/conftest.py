@@ -10,10 +10,10 @@ import pytest
 
 from doorstate._files import write_csv
 from doorstate.dataset.store import CLOUDS, MANIFEST, DatasetDescription
-from doorstate.simulation.generate import PRESETS
-from doorstate.simulation.run import simulate_dataset
-from doorstate.simulation.sensor import DepthCamera
+from doorstate.simulation.camera import DepthCamera
+from doorstate.simulation.presets import PRESETS
 from doorstate.simulation.settings import SimulationSettings
+from doorstate.simulation.writer import simulate_dataset
 from doorstate.types import STATES
 
 

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Callable
 from pathlib import Path
 
@@ -20,20 +19,23 @@ from doorstate.errors import CameraError, CloudReadError, ConfigError, DatasetEr
 from doorstate.io.camera import Intrinsics, Pinhole
 from doorstate.io.depth import depth_to_points
 from doorstate.io.options import ReadOptions
-from doorstate.simulation.scene import Door, build_scene
-from doorstate.simulation.sensor import CameraPose, render
+from doorstate.simulation.camera import CameraPose
+from doorstate.simulation.render import render
+from doorstate.simulation.scene import Door, Opening, Scene, scene_boxes
 from doorstate.types import Part
 
 Run = Callable[..., tuple[int, str, str]]
 STEP_M = 0.0625
 HEIGHT_M = 1.1
 # 2.5 m before the wall, looking straight at it, turned by 90 degrees as the authors' camera was.
-POSE = CameraPose.of_degrees((0.1, 2.5, HEIGHT_M), -90, 0, 90)
+POSE = CameraPose.from_degrees((0.1, 2.5, HEIGHT_M), -90, 0, 90)
 
 
 def seen(opening_deg: float) -> tuple[np.ndarray, np.ndarray]:
     """(480, 640) depth in metres, NaN beyond 10 m, and parts, as the turned camera sees a door."""
-    frame = render(build_scene(Door(), math.radians(opening_deg)), POSE, CAMERA)
+    frame = render(
+        scene_boxes(Scene(door=Door(), has_ceiling=False), Opening(angle_deg=opening_deg)), POSE, CAMERA
+    )
     return np.where(frame.depth_m < 10, frame.depth_m, np.nan), frame.part
 
 

@@ -14,10 +14,10 @@ from doorstate.dataset.loader import CloudLoader
 from doorstate.dataset.prepare import Preparation, prepare_dataset, prepare_shard
 from doorstate.dataset.splits import draw_splits
 from doorstate.errors import ConfigError
-from doorstate.simulation.run import simulate_dataset
-from doorstate.simulation.scene_rows import PresetName, ScenePreset
-from doorstate.simulation.sensor import DepthCamera
-from doorstate.simulation.settings import SceneSettings
+from doorstate.simulation.camera import DepthCamera
+from doorstate.simulation.presets import Preset, PresetName
+from doorstate.simulation.settings import SimulationSettings
+from doorstate.simulation.writer import simulate_dataset
 from doorstate.types import STATES, Part
 
 POINTS = 256
@@ -29,8 +29,8 @@ def simulated(tmp_path_factory: pytest.TempPathFactory) -> dict[PresetName, Path
     folders: dict[PresetName, Path] = {}
     for name, scenes in (("cluttered", 12), ("no-door", 5)):
         folder = tmp_path_factory.mktemp("scenes") / name
-        preset = ScenePreset(name=name, camera=DepthCamera(width=80, height=60))  # type: ignore[arg-type]
-        simulate_dataset(folder, SceneSettings(preset=preset, seed=0, scenes=scenes), 1)
+        preset = Preset(name=name, camera=DepthCamera(width=80, height=60))  # type: ignore[arg-type]
+        simulate_dataset(folder, SimulationSettings(preset=preset, seed=0, poses=scenes), 1)
         folders[name] = folder  # type: ignore[index]
     return folders
 

@@ -15,18 +15,18 @@ from doorstate.dataset.prepare import Preparation, prepare_dataset
 from doorstate.dataset.simulated import Sampler, simulate_prepared
 from doorstate.errors import ConfigError
 from doorstate.simulation import run
-from doorstate.simulation.run import simulate_dataset, simulate_shard
-from doorstate.simulation.scene_rows import PresetName, ScenePreset
-from doorstate.simulation.sensor import DepthCamera
-from doorstate.simulation.settings import SceneSettings
+from doorstate.simulation.camera import DepthCamera
+from doorstate.simulation.presets import Preset, PresetName
+from doorstate.simulation.settings import SimulationSettings
+from doorstate.simulation.writer import simulate_dataset, simulate_shard
 
 NUM_POINTS = 160
 SPEC = CloudSpec(num_points=NUM_POINTS)
 
 
-def settings_of(name: PresetName, scenes: int) -> SceneSettings:
-    preset = ScenePreset(name=name, camera=DepthCamera(width=80, height=60))
-    return SceneSettings(preset=preset, seed=5, scenes=scenes)
+def settings_of(name: PresetName, scenes: int) -> SimulationSettings:
+    preset = Preset(name=name, camera=DepthCamera(width=80, height=60))
+    return SimulationSettings(preset=preset, seed=5, poses=scenes)
 
 
 def asked_of(source: Path) -> Preparation:
@@ -69,7 +69,7 @@ def test_shards_and_a_killed_run_are_gone_on_with(
     two_passes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     settings, source = settings_of("varied", 10), tmp_path / "varied"
-    simulate_shard(source, settings, Shard(2, 2), 1, also=Sampler(asked_of(source)))
+    simulate_shard(source, settings, Shard(2, 2), 1, callback=Sampler(asked_of(source)))
     rendered: list[int] = []
     simulate = run._simulate_piece
 

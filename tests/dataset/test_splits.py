@@ -15,7 +15,7 @@ from scipy.spatial.distance import cdist
 from doorstate.dataset.splits import draw_splits, read_splits, write_splits
 from doorstate.dataset.strata import distance_band, polar, region
 from doorstate.errors import ConfigError, DatasetError
-from doorstate.simulation.placement import half_ring, reduced_ring
+from doorstate.simulation.draw.half_ring import half_ring, reduced_ring
 from doorstate.types import STATES
 
 

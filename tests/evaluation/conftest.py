@@ -15,8 +15,8 @@ from doorstate._files import write_csv
 from doorstate.dataset.splits import draw_splits, read_splits, write_splits
 from doorstate.dataset.store import CLOUDS, MANIFEST, PARTS, DatasetDescription, PreparedDataset, open_dataset
 from doorstate.dataset.strata import distance_band, region
-from doorstate.simulation.generate import PRESETS, draw_pose, pose_indices
 from doorstate.simulation.manifest import flatten
+from doorstate.simulation.presets import PRESETS, draw_rows
 from doorstate.types import NO_DOOR, STATES, Part
 
 POSES = 40
@@ -44,8 +44,8 @@ def _write_dataset(folder: Path, rows: list[dict[str, str]], kind: str) -> Prepa
 def simulated(tmp_path_factory: pytest.TempPathFactory) -> PreparedDataset:
     """40 poses of the simulator, never rendered; the semi-open and open frames of the first are called equal."""
     rows = []
-    for index in pose_indices(POSES):
-        for sample in draw_pose(PRESETS["ogurob"], 7, index):
+    for index in PRESETS["ogurob"].indices(POSES):
+        for sample in draw_rows(PRESETS["ogurob"], 7, index):
             strata = {
                 "distance_band": distance_band(sample.distance_m),
                 "region": region(sample.robot_angle_deg),

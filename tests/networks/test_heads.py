@@ -23,8 +23,8 @@ from doorstate.networks.heads import (
     head_metrics,
     head_targets,
 )
-from doorstate.simulation.generate import PRESETS, draw_pose
 from doorstate.simulation.manifest import flatten
+from doorstate.simulation.presets import PRESETS, draw_rows
 
 ROW = {
     "state": "open",
@@ -67,7 +67,7 @@ def test_only_the_named_heads_have_targets() -> None:
 
 
 def test_rows_of_the_first_preset_have_all_but_the_passable_width() -> None:
-    row = flatten(draw_pose(PRESETS["ogurob"], 3, 700)[1])
+    row = flatten(draw_rows(PRESETS["ogurob"], 3, 700)[1])
     targets = head_targets([row], np.zeros((1, 3), dtype=np.float32))
     assert targets["hinge"][0, 0] == 1
     assert targets["widths"][0, 0] * SCALE_M == pytest.approx(0.9)

@@ -31,7 +31,7 @@ from doorstate.inference.predictor import Predictor
 from doorstate.inference.watch_settings import WatchSettings
 from doorstate.io.depth import points_from_optical
 from doorstate.simulation.frames import replay
-from doorstate.simulation.generate import PRESETS, draw_pose
+from doorstate.simulation.presets import PRESETS, draw_rows
 from doorstate.types import Points
 
 PACKAGE = Path(__file__).resolve().parents[2] / "ros2" / "doorstate_ros"
@@ -141,7 +141,7 @@ def start(*arguments: str) -> subprocess.Popen[str]:
 @pytest.fixture(scope="module")
 def clouds() -> list[Points]:
     """Closed, semi-open, open, and nothing measured."""
-    small = [replay(row).points[::STEP, ::STEP] for row in draw_pose(PRESETS["ogurob"], 3, 700)]
+    small = [replay(row).points[::STEP, ::STEP] for row in draw_rows(PRESETS["ogurob"], 3, 700)]
     return [*small, np.full_like(small[0], np.nan)]
 
 

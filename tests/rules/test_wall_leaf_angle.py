@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from doorstate.io.depth import depth_to_points
 from doorstate.rules.wall_leaf_angle import WallLeafAngleRule
+from doorstate.simulation.camera import CAMERAS
 from doorstate.simulation.frames import level
-from doorstate.simulation.sensor import CAMERAS
 from doorstate.types import DoorState
 
 GAZEBO = Path(__file__).resolve().parents[1] / "fixtures" / "gazebo"

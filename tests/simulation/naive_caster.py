@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Oracle of the caster: one ray, one box, one axis at a time, in plain Python."""
+"""Oracle of the renderer: one ray, one box, one axis at a time, in plain Python."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from doorstate.io.camera import Intrinsics
+from doorstate.simulation.camera import CameraPose
 from doorstate.simulation.scene import Box
-from doorstate.simulation.sensor import CameraPose
 from doorstate.types import Part
 
 Vector = tuple[float, float, float]
@@ -26,7 +26,7 @@ def turn_z(vector: Vector, angle_rad: float) -> Vector:
 
 
 def pixel_ray(row: int, column: int, pose: CameraPose, camera: Intrinsics) -> Vector:
-    """Direction in the door frame with a forward part of one, so that its length counts z-depth."""
+    """Return the ray's direction in the door frame, scaled to unit z-depth."""
     left, up = (camera.cx - column) / camera.fx, (camera.cy - row) / camera.fy
     # Roll turns about x: a camera turned clockwise sees at its left what is above.
     cos, sin = math.cos(pose.roll_rad), math.sin(pose.roll_rad)
@@ -37,7 +37,7 @@ def pixel_ray(row: int, column: int, pose: CameraPose, camera: Intrinsics) -> Ve
 
 
 def box_depth(box: Box, origin: Vector, ray: Vector) -> float:
-    """Where the ray enters the box, infinite where it does not."""
+    """Return the z-depth at which the ray enters the box, infinite if it misses."""
     offset = turn_z(tuple(a - b for a, b in zip(origin, box.center_m, strict=True)), -box.yaw_rad)
     direction = turn_z(ray, -box.yaw_rad)
     enter, leave = 0.0, math.inf
@@ -53,14 +53,14 @@ def box_depth(box: Box, origin: Vector, ray: Vector) -> float:
 
 
 def cast(boxes: Sequence[Box], pose: CameraPose, camera: Intrinsics) -> tuple[np.ndarray, np.ndarray]:
-    """Depth and part of every pixel."""
+    """Return depth and part of every pixel."""
     depth = np.full((camera.height, camera.width), np.inf)
     part = np.full(depth.shape, int(Part.NONE))
     for row in range(camera.height):
         for column in range(camera.width):
             ray = pixel_ray(row, column, pose, camera)
             for box in boxes:
-                found = box_depth(box, pose[:3], ray)
-                if found < depth[row, column]:
-                    depth[row, column], part[row, column] = found, box.part
+                hit = box_depth(box, pose[:3], ray)
+                if hit < depth[row, column]:
+                    depth[row, column], part[row, column] = hit, box.part
     return depth, part

@@ -14,8 +14,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from doorstate.simulation.scene import Box, Door, build_scene
-from doorstate.simulation.sensor import CAMERAS, CameraPose, cut_range, render
+from doorstate.simulation.camera import CAMERAS, CameraPose
+from doorstate.simulation.render import cut_range, render
+from doorstate.simulation.scene import Box, Door, Opening, Scene, scene_boxes
 from doorstate.types import Part
 
 GAZEBO = Path(__file__).resolve().parents[1] / "fixtures" / "gazebo"
@@ -69,7 +70,7 @@ def test_the_caster_equals_gazebo() -> None:
 @pytest.mark.parametrize("frame", FRAMES, ids=lambda frame: frame["name"])
 def test_the_door_is_the_one_gazebo_was_given(frame: dict[str, Any]) -> None:
     door = Door(hinge=frame["hinge"], swing=frame["swing"])
-    ours = build_scene(door, math.radians(frame["opening_angle_deg"]))
+    ours = scene_boxes(Scene(door=door, has_ceiling=False), Opening(angle_deg=frame["opening_angle_deg"]))
     theirs = fixture_boxes(frame)
     found = matches(ours, theirs)
     assert all(len(match) == 1 for match in found)

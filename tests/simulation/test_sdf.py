@@ -10,19 +10,20 @@ import numpy as np
 import pytest
 
 from doorstate.errors import ConfigError
-from doorstate.simulation.frames import replay, sensed_by
-from doorstate.simulation.generate import PRESETS, draw_pose
-from doorstate.simulation.manifest import Row
+from doorstate.simulation.camera import CameraPose, DepthCamera
+from doorstate.simulation.frames import replay
+from doorstate.simulation.generate import with_sensor
+from doorstate.simulation.presets import PRESETS, draw_rows
+from doorstate.simulation.render import cut_range, render_behind_glass
+from doorstate.simulation.row import Row
 from doorstate.simulation.scene import Box
-from doorstate.simulation.scene_rows import SCENE_PRESETS, draw_scene
 from doorstate.simulation.sdf import sdf_world
-from doorstate.simulation.sensor import CameraPose, DepthCamera, cut_range, render_behind_glass
 from doorstate.types import Part
 
-ROWS = [draw_scene(preset, 0, 3)[-1] for preset in SCENE_PRESETS.values()]
+ROWS = [draw_rows(preset, 0, 3)[-1] for preset in PRESETS.values()]
 GLASS = next(
     rows[1]
-    for rows in (draw_scene(SCENE_PRESETS["varied"], 0, index) for index in range(99))
+    for rows in (draw_rows(PRESETS["varied"], 0, index) for index in range(99))
     if rows[0].door_kind == "full_glass"
 )
 
@@ -58,7 +59,7 @@ def read_camera(world: ET.Element) -> tuple[CameraPose, DepthCamera]:
 
 
 @pytest.mark.parametrize(
-    "row", [*ROWS, GLASS, draw_pose(PRESETS["ogurob"], 0, 700)[1]], ids=lambda row: row.sample_id
+    "row", [*ROWS, GLASS, draw_rows(PRESETS["ogurob"], 0, 700)[1]], ids=lambda row: row.sample_id
 )
 def test_a_world_read_back_gives_the_same_boxes_and_the_same_depth(row: Row) -> None:
     root = ET.fromstring(sdf_world(row, row.sample_id))
@@ -81,4 +82,4 @@ def test_a_world_read_back_gives_the_same_boxes_and_the_same_depth(row: Row) -> 
 
 def test_a_camera_that_gazebo_does_not_have_is_refused() -> None:
     with pytest.raises(ConfigError, match="not centred"):
-        sdf_world(sensed_by(ROWS[0], "deepdoors2"), "world")
+        sdf_world(with_sensor(ROWS[0], "deepdoors2"), "world")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The picture for the eye: parts in their colours, lit by their slope."""
+"""Shaded pictures: parts in their colours, lit by their slope."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from doorstate.io.camera import Intrinsics
-from doorstate.simulation.sensor import Render
+from doorstate.simulation.render import Render
 from doorstate.simulation.shading import shade
 from doorstate.types import Part
 

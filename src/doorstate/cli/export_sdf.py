@@ -26,8 +26,8 @@ def export_sdf(
     from doorstate._files import read_csv, write_text
     from doorstate.cli.console import stdout
     from doorstate.simulation.manifest import unflatten
-    from doorstate.simulation.run import MANIFEST
     from doorstate.simulation.sdf import sdf_world
+    from doorstate.simulation.writer import MANIFEST
 
     manifest = source / MANIFEST
     if not manifest.is_file():

@@ -67,8 +67,8 @@ def simulate(
     from doorstate.clouds.preparation import CloudSpec
     from doorstate.dataset.prepare import Preparation
     from doorstate.dataset.simulated import Sampler, simulate_prepared
-    from doorstate.simulation.run import simulate_dataset, simulate_shard
     from doorstate.simulation.settings import RAW_KINDS, settings_for
+    from doorstate.simulation.writer import simulate_dataset, simulate_shard
 
     unknown = [kind for kind in keep or [] if kind not in RAW_KINDS]
     if unknown:

@@ -35,8 +35,8 @@ from doorstate.io.options import ReadOptions
 from doorstate.io.readers import read_cloud
 from doorstate.simulation.frames import depth_sha256, replay
 from doorstate.simulation.manifest import unflatten
-from doorstate.simulation.run import MANIFEST as SIMULATED_MANIFEST
-from doorstate.simulation.run import is_simulated, read_settings
+from doorstate.simulation.writer import MANIFEST as SIMULATED_MANIFEST
+from doorstate.simulation.writer import is_simulated, read_settings
 from doorstate.types import Points
 
 REJECTED = "rejected.csv"

@@ -24,9 +24,9 @@ from doorstate.dataset.sampled import sample_frame
 from doorstate.dataset.store import is_prepared
 from doorstate.errors import CloudError
 from doorstate.simulation.frames import Frame
-from doorstate.simulation.manifest import Row
-from doorstate.simulation.run import piece_names, simulate_dataset
-from doorstate.simulation.settings import Settings
+from doorstate.simulation.row import Row
+from doorstate.simulation.settings import SimulationSettings
+from doorstate.simulation.writer import piece_names, simulate_dataset
 from doorstate.types import Points
 
 
@@ -64,7 +64,7 @@ class Sampler:
 
 
 def simulate_prepared(
-    settings: Settings,
+    settings: SimulationSettings,
     asked: Preparation,
     folder: Path,
     workers: int | None = None,

@@ -20,10 +20,10 @@ from doorstate.evaluation.metrics import Floats
 from doorstate.evaluation.results import ComparisonResults
 from doorstate.evaluation.stratum_tables import is_undecidable
 from doorstate.evaluation.views import REGION_COLORS, STATE_COLORS, STATE_WORDS, outside_legend
-from doorstate.simulation.generate import SampleRow
 from doorstate.simulation.manifest import unflatten
-from doorstate.simulation.scene import Door, build_scene
-from doorstate.types import STATES, Part
+from doorstate.simulation.scene import Door, Opening
+from doorstate.simulation.scene.door_boxes import leaf_boxes
+from doorstate.types import STATES
 
 _RINGS_M = (1.5, 2.0, 2.5, 3.0, 3.5)
 _INK, _FAINT = "#333333", "#BBBBBB"
@@ -111,9 +111,10 @@ def error_map(results: ComparisonResults, dataset: PreparedDataset) -> Figure | 
 
 
 def _door_of(dataset: PreparedDataset) -> Door:
-    """The door of a simulated data set; of another, a sketch with the simulator's sizes."""
-    row = unflatten(dataset.rows[0]) if "door.hinge" in dataset.rows[0] else None
-    return row.door if isinstance(row, SampleRow) else Door()
+    """Return the door that all samples of a simulated data set show; for other data sets, the default door."""
+    first = dataset.rows[0]
+    shows_one_scene = first.get("scene") and not first.get("scene_id")
+    return (unflatten(first).scene.door if shows_one_scene else None) or Door()
 
 
 def _posed_rows(dataset: PreparedDataset) -> list[dict[str, str]]:
@@ -133,7 +134,7 @@ def _draw_ground(axis: Axes, door: Door, lettering: bool = True) -> None:
             Rectangle((left, -thick), 3.9 - half, thick, facecolor="#8C8C8C", edgecolor=_INK, linewidth=0.6)
         )
     for angle_deg, alpha in ((0.0, 0.3), (45.0, 1.0), (90.0, 0.3)):
-        leaf = next(box for box in build_scene(door, math.radians(angle_deg)) if box.part == Part.LEAF)
+        leaf = leaf_boxes(door.model_copy(update={"handle": None}), Opening(angle_deg=angle_deg))[0]
         width, depth = leaf.size_m[:2]
         corner = (leaf.center_m[0] - width / 2, leaf.center_m[1] - depth / 2)
         outline = Rectangle(

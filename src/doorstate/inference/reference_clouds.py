@@ -12,7 +12,8 @@ from doorstate._jobs import Progress, no_progress
 from doorstate.clouds.preparation import CloudSpec, prepare_cloud
 from doorstate.errors import ConfigError
 from doorstate.simulation.frames import replay
-from doorstate.simulation.generate import PRESETS, SampleRow, draw_pose, pose_indices
+from doorstate.simulation.presets import PRESETS, draw_rows
+from doorstate.simulation.row import Row
 from doorstate.types import STATES, Points
 
 _SEED = 1_000_003  # of no data set
@@ -25,10 +26,10 @@ class LabelledClouds(NamedTuple):
     labels: NDArray[np.int64]  # (M,)
 
 
-def reference_rows(count: int) -> list[SampleRow]:
+def reference_rows(count: int) -> list[Row]:
     """Rows of doors in all three states, poses spread over the room."""
-    poses = pose_indices(max(3, -(-count // len(STATES))))
-    return [row for pose in poses for row in draw_pose(PRESETS["ogurob"], _SEED, pose)][:count]
+    poses = PRESETS["ogurob"].indices(max(3, -(-count // len(STATES))))
+    return [row for pose in poses for row in draw_rows(PRESETS["ogurob"], _SEED, pose)][:count]
 
 
 def reference_clouds(count: int, num_points: int, progress: Progress = no_progress) -> LabelledClouds:

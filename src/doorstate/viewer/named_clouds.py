@@ -20,7 +20,7 @@ from doorstate.io.options import DEFAULT_OPTIONS, ReadOptions
 from doorstate.io.readers import read_cloud
 from doorstate.simulation.frames import replay
 from doorstate.simulation.manifest import unflatten
-from doorstate.simulation.run import MANIFEST, is_simulated
+from doorstate.simulation.writer import MANIFEST, is_simulated
 from doorstate.types import Points
 
 

@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whole sensors: what they measure of walls and doors, beside what is published of them."""
+"""Complete sensor models on walls and doors, compared with published measurements."""
 
 from __future__ import annotations
 
 import dataclasses
 import hashlib
 import json
-import math
 from pathlib import Path
 from typing import Any
 
@@ -18,24 +17,17 @@ from pydantic import ValidationError
 from doorstate._jobs import no_progress
 from doorstate.dataset.deepdoors2 import CAMERA as DEEPDOORS2
 from doorstate.errors import ConfigError
-from doorstate.simulation.noise.models import SENSORS, SensorModel, apply, distort, find_sensor
-from doorstate.simulation.scene import Box, Door, build_scene
-from doorstate.simulation.sensor import (
-    CAMERAS,
-    NO_BOX,
-    CameraPose,
-    DepthCamera,
-    Render,
-    cut_range,
-    render_behind_glass,
-)
+from doorstate.simulation.camera import CAMERAS, CameraPose, DepthCamera
+from doorstate.simulation.noise.models import SENSORS, SensorModel, distort, find_sensor, sense
+from doorstate.simulation.render import NO_BOX, Render, cut_range, render_behind_glass
+from doorstate.simulation.scene import Box, Door, Opening, Scene, scene_boxes
 from doorstate.types import Part
 
 REPOSITORY = Path(__file__).resolve().parents[3]
-POSE = CameraPose.of_degrees((0.4, 2.2, 1.0), -97.0, 3.0)
+POSE = CameraPose.from_degrees((0.4, 2.2, 1.0), -97.0, 3.0)
 # Hinged on the right: the free edge, before what is behind it, is the leaf's left one, where shadows fall.
-BOXES = build_scene(Door(hinge="right"), math.radians(50))
-# SIMULATION section 3.1, in mm; the Kinect's line is the Xtion's, that of `deepdoors2` the D435's for its focal length.
+BOXES = scene_boxes(Scene(door=Door(hinge="right"), has_ceiling=False), Opening(angle_deg=50))
+# docs/sensors.md, in mm; the Kinect's row is the Xtion's, that of `deepdoors2` the D435's for its focal length.
 TABLE_MM = {
     "gaussian": dict.fromkeys((1.0, 2.0, 3.0, 3.5, 5.0), 10.0),
     "kinect": {1.0: 1.9, 2.0: 6.1, 3.0: 14.0, 3.5: 19.5, 5.0: 41.4},
@@ -102,7 +94,7 @@ def test_a_sensor_measures_the_same_again_and_something_else_of_another_seed(nam
     model, camera = small(name)
     seen = render_behind_glass(BOXES, POSE, camera.intrinsics())
     before = [image.copy() for image in seen]
-    one, again, other = (apply(model, seen, BOXES, POSE, camera, seed) for seed in (5, 5, 6))
+    one, again, other = (sense(model, seen, BOXES, POSE, camera, seed) for seed in (5, 5, 6))
     assert all(np.array_equal(a, b) for a, b in zip(before, seen, strict=True))
     assert all(a.tobytes() == b.tobytes() and a.dtype == b.dtype for a, b in zip(one, again, strict=True))
     assert (one.depth_m.tobytes() == other.depth_m.tobytes()) == (name == "none")
@@ -116,14 +108,14 @@ def test_a_sensor_measures_the_same_again_and_something_else_of_another_seed(nam
 def test_the_sensor_none_gives_every_bit_of_the_rendering() -> None:
     camera = CAMERAS["xtion-gazebo"]
     seen = render_behind_glass(BOXES, POSE, camera.intrinsics())
-    found, clean = apply(SENSORS["none"], seen, BOXES, POSE, camera, 1), cut_range(seen, camera)
+    found, clean = sense(SENSORS["none"], seen, BOXES, POSE, camera, 1), cut_range(seen, camera)
     assert all(a.tobytes() == b.tobytes() for a, b in zip(found, clean, strict=True))
 
 
 def test_an_xtion_measures_the_same_bits_on_every_machine() -> None:
     model = SENSORS["xtion"]
     seen = render_behind_glass(BOXES, POSE, model.camera.intrinsics())
-    depth_m = apply(model, seen, BOXES, POSE, model.camera, 2026).depth_m
+    depth_m = sense(model, seen, BOXES, POSE, model.camera, 2026).depth_m
     assert (
         hashlib.sha256(depth_m.tobytes()).hexdigest()
         == "bc7d17d28205540182c623b8c9a2464585b8b5e80a7f74e89fbb69d6f25721e0"
@@ -195,8 +187,8 @@ def test_a_closed_door_sinks_into_the_noise_with_distance() -> None:
     model = SENSORS["xtion"]
     found = {}
     for distance_m in (1.0, 3.3):
-        pose = CameraPose.of_degrees((0.0, distance_m, 1.2), -90.0, 0.0)
-        boxes = build_scene(Door(), 0.0)
+        pose = CameraPose.from_degrees((0.0, distance_m, 1.2), -90.0, 0.0)
+        boxes = scene_boxes(Scene(door=Door(), has_ceiling=False), Opening())
         seen = render_behind_glass(boxes, pose, model.camera.intrinsics())
         depth_m = distort(
             only(model, "axial", "disparity_steps"), seen, boxes, pose, model.camera.intrinsics(), 0
@@ -222,10 +214,10 @@ def test_a_gaussian_of_any_deviation_is_found(name: str) -> None:
 @pytest.mark.parametrize(
     "name", ["kinect2", "gaussian:", "gaussian:x", "gaussian:-1", "gaussian:nan", "xtion:2"]
 )
-def test_an_unknown_sensor_is_refused_in_one_line(name: str) -> None:
-    with pytest.raises(ConfigError, match=r"^(no )?sensor ") as refused:
+def test_an_unknown_sensor_is_refused(name: str) -> None:
+    with pytest.raises(ConfigError) as refused:
         find_sensor(name)
-    assert "\n" not in str(refused.value)
+    assert refused.value.field == "sensor"
 
 
 def test_models_are_settings_that_read_back_and_cannot_be_misspelt() -> None:

@@ -17,15 +17,10 @@ from doorstate.simulation.noise.dropout import Grazing, Speckle, lose_grazing, l
 from doorstate.simulation.noise.edges import Edges, blur_edges
 from doorstate.simulation.noise.lateral import Lateral, draw_moves
 from doorstate.simulation.noise.materials import lose_patches
-from doorstate.simulation.noise.quantisation import (
-    DepthSteps,
-    DisparitySteps,
-    round_depth,
-    round_disparity,
-)
+from doorstate.simulation.noise.quantisation import DepthSteps, DisparitySteps, round_depth, round_disparity
 from doorstate.simulation.noise.shadow import SecondView, hide_from_second_view
 from doorstate.simulation.noise.streams import sample_seed, stage_rng
-from doorstate.simulation.sensor import Render
+from doorstate.simulation.render import Render
 from doorstate.types import DepthImage
 
 PROJECTOR, IMAGER = SecondView(baseline_m=0.075), SecondView(baseline_m=0.075, is_imager=True)

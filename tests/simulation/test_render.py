@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The caster against a plain loop over rays and boxes, and walls whose distance is known."""
+"""Rendering, compared with a plain loop over rays and boxes, and with walls at known distances."""
 
 from __future__ import annotations
 
@@ -13,8 +13,9 @@ from hypothesis.extra import numpy as npst
 
 from doorstate.io.camera import Intrinsics
 from doorstate.io.depth import depth_to_points
+from doorstate.simulation.camera import CAMERAS, CameraPose, DepthCamera
+from doorstate.simulation.render import Render, cut_range, render
 from doorstate.simulation.scene import Box
-from doorstate.simulation.sensor import CAMERAS, CameraPose, DepthCamera, Render, cut_range, render
 from doorstate.types import Part
 from tests.simulation import naive_caster
 
@@ -23,7 +24,7 @@ LEVEL = CameraPose(0.0, 0.0, 0.0, 0.0)
 
 
 def random_boxes(rng: np.random.Generator, pose: CameraPose, count: int) -> list[Box]:
-    """Boxes all around the camera, but none that it stands in."""
+    """Return boxes around the camera; none of them contains it."""
     boxes = []
     while len(boxes) < count:
         size, center = rng.uniform(0.05, 2.0, 3), rng.uniform(-3, 3, 3) + pose[:3]
@@ -37,24 +38,24 @@ def random_boxes(rng: np.random.Generator, pose: CameraPose, count: int) -> list
 
 @given(seed=st.integers(0, 2**32 - 1), is_level=st.booleans())
 @settings(deadline=None, max_examples=60)
-def test_equals_a_loop_over_rays_and_boxes(seed: int, is_level: bool) -> None:
+def test_rendering_equals_a_loop_over_rays_and_boxes(seed: int, is_level: bool) -> None:
     rng = np.random.default_rng(seed)
     x, y, z, yaw, pitch = rng.uniform(-3, 3, 5).tolist()
     pose = CameraPose(x, y, z, yaw, 0.0 if is_level else pitch / 2)
     boxes = random_boxes(rng, pose, 6)
     depth, part = naive_caster.cast(boxes, pose, CAMERA)
-    found = render(boxes, pose, CAMERA)
-    assert found.depth_m.dtype == np.float32
-    np.testing.assert_allclose(found.depth_m, depth, rtol=1e-6)
-    np.testing.assert_array_equal(found.part, part)
+    rendered = render(boxes, pose, CAMERA)
+    assert rendered.depth_m.dtype == np.float32
+    np.testing.assert_allclose(rendered.depth_m, depth, rtol=1e-6)
+    np.testing.assert_array_equal(rendered.part, part)
 
 
 def test_a_wall_two_metres_away_is_two_metres_away_in_every_pixel() -> None:
     wall = Box(Part.WALL, (2.5, 0.0, 0.0), (1.0, 100.0, 100.0))
-    found = render([wall], LEVEL, CAMERA)
-    assert (found.depth_m == 2.0).all()
-    assert (found.part == Part.WALL).all()
-    points = depth_to_points(found.depth_m, CAMERA)
+    rendered = render([wall], LEVEL, CAMERA)
+    assert (rendered.depth_m == 2.0).all()
+    assert (rendered.part == Part.WALL).all()
+    points = depth_to_points(rendered.depth_m, CAMERA)
     # Half the image width is W / 2 pixels of f = W / (2 tan(hfov / 2)); the outermost centre is half a pixel inside.
     assert points[0, 0] == pytest.approx(
         (2.0, 2 * 17 / 18 * math.tan(math.radians(35)), 2 * 13 / 18 * math.tan(math.radians(35)))
@@ -72,31 +73,31 @@ def test_positive_pitch_looks_down_and_positive_yaw_to_the_left() -> None:
     assert turned.depth_m.min() == pytest.approx(2.5)
 
 
-def test_what_is_behind_is_not_seen_and_what_is_partly_behind_is() -> None:
+def test_boxes_behind_the_camera_are_clipped() -> None:
     behind = Box(Part.OTHER, (-2.0, 0.0, 0.0), (1.0, 1.0, 1.0))
     assert np.isinf(render([behind], LEVEL, CAMERA).depth_m).all()
     # A wall on the left from 2 m behind to 3 m ahead: a ray of slope s meets it at z = 1 / s.
     beside = Box(Part.WALL, (0.5, 1.5, 0.0), (5.0, 1.0, 9.0))
-    found = render([beside], LEVEL, CAMERA)
+    rendered = render([beside], LEVEL, CAMERA)
     slope = (CAMERA.cx - np.arange(CAMERA.width)) / CAMERA.fx
     with np.errstate(divide="ignore"):
         expected = np.where((slope > 0) & (1 / slope < 3), 1 / slope, np.inf)
     assert np.isfinite(expected).sum() in range(1, 9)
-    np.testing.assert_allclose(found.depth_m, np.tile(expected, (CAMERA.height, 1)), rtol=1e-6)
+    np.testing.assert_allclose(rendered.depth_m, np.tile(expected, (CAMERA.height, 1)), rtol=1e-6)
 
 
-def test_of_two_surfaces_at_one_depth_the_first_wins_and_the_nearer_always() -> None:
-    one = Box(Part.FRAME, (2.5, 0.0, 0.0), (1.0, 9.0, 9.0))
-    other = one._replace(part=Part.LEAF)
+def test_the_nearer_surface_wins_and_the_first_at_equal_depth() -> None:
+    first = Box(Part.FRAME, (2.5, 0.0, 0.0), (1.0, 9.0, 9.0))
+    second = first._replace(part=Part.LEAF)
     nearer = Box(Part.OTHER, (1.5, 0.0, 0.0), (0.5, 9.0, 9.0))
-    assert (render([one, other], LEVEL, CAMERA).part == Part.FRAME).all()
-    assert (render([one, nearer, other], LEVEL, CAMERA).part == Part.OTHER).all()
+    assert (render([first, second], LEVEL, CAMERA).part == Part.FRAME).all()
+    assert (render([first, nearer, second], LEVEL, CAMERA).part == Part.OTHER).all()
 
 
-def test_nothing_seen_is_infinitely_far() -> None:
-    found = render([], LEVEL, CAMERA)
-    assert np.isposinf(found.depth_m).all()
-    assert (found.part == Part.NONE).all()
+def test_an_empty_scene_is_infinitely_far() -> None:
+    rendered = render([], LEVEL, CAMERA)
+    assert np.isposinf(rendered.depth_m).all()
+    assert (rendered.part == Part.NONE).all()
 
 
 _LIMITS = np.array(
@@ -114,7 +115,7 @@ _LIMITS = np.array(
 @given(depth=npst.arrays(np.float32, 5, elements=st.floats(0, 10, width=32) | st.just(math.inf)))
 @example(depth=_LIMITS)
 @settings(deadline=None, max_examples=50)
-def test_only_what_lies_strictly_within_the_range_is_measured(depth: np.ndarray) -> None:
+def test_the_range_excludes_its_limits(depth: np.ndarray) -> None:
     parts = np.arange(5, dtype=np.uint8)
     cut = cut_range(Render(depth[None], parts[None], parts[None].astype(np.int16)), DepthCamera())
     for before, after, part, number in zip(depth, cut.depth_m[0], cut.part[0], range(5), strict=True):
@@ -125,7 +126,7 @@ def test_only_what_lies_strictly_within_the_range_is_measured(depth: np.ndarray)
             assert part == Part.NONE
 
 
-def test_the_cameras_are_those_of_the_plugin_and_of_the_data_sheet() -> None:
+def test_cameras_have_the_intrinsics_of_the_plugin_and_the_data_sheet() -> None:
     gazebo, hardware = CAMERAS["xtion-gazebo"].intrinsics(), CAMERAS["xtion-hw"].intrinsics()
     assert (gazebo.width, gazebo.height, gazebo.cx, gazebo.cy) == (640, 480, 319.5, 239.5)
     assert gazebo.fx == gazebo.fy == pytest.approx(554.256258422)

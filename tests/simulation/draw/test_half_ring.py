@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The half-ring of poses: the paper's numbers, counted."""
+"""The half-ring of poses has the counts of the paper."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from doorstate.dataset.strata import BANDS, REGIONS, distance_band, polar, region
-from doorstate.simulation.placement import Position, draw_heading_rad, half_ring, reduced_ring
+from doorstate.errors import ConfigError
+from doorstate.simulation.draw.half_ring import Position, draw_heading_offset_deg, half_ring, reduced_ring
 
 RING = half_ring()
 
@@ -29,7 +30,7 @@ def test_there_are_1353_positions_as_in_the_paper() -> None:
     assert Position(21, 28) not in RING  # exactly 3.5 m, off the axis
 
 
-def test_they_fall_into_the_strata_of_table_1() -> None:
+def test_positions_have_the_strata_of_table_1() -> None:
     counts = Counter(stratum(position) for position in RING)
     assert [[counts[band, name] for name in REGIONS] for band in BANDS] == [
         [18, 46, 91, 46, 18],
@@ -39,28 +40,24 @@ def test_they_fall_into_the_strata_of_table_1() -> None:
     ]
 
 
-def test_headings_look_at_the_door_within_20_degrees() -> None:
-    jitter_deg = []
-    for index, position in enumerate(RING):
-        bearing = math.atan2(-position.y_m, -position.x_m)
-        heading = draw_heading_rad(position, 3, index)
-        jitter_deg.append(math.degrees(math.remainder(heading - bearing, 2 * math.pi)))
-    assert max(map(abs, jitter_deg)) <= 20
+def test_headings_deviate_from_the_bearing_by_up_to_20_degrees() -> None:
+    offsets = [draw_heading_offset_deg(3, index) for index in range(len(RING))]
+    assert max(map(abs, offsets)) <= 20
     # A uniform draw of this many covers its range evenly.
-    assert [sum(low <= x < low + 10 for x in jitter_deg) for low in (-20, -10, 0, 10)] == pytest.approx(
+    assert [sum(low <= x < low + 10 for x in offsets) for low in (-20, -10, 0, 10)] == pytest.approx(
         [338] * 4, abs=80
     )
 
 
 def test_a_heading_depends_on_seed_and_position_only() -> None:
-    drawn = [draw_heading_rad(RING[7], seed, index) for seed, index in ((1, 7), (1, 7), (2, 7), (1, 8))]
+    drawn = [draw_heading_offset_deg(seed, index) for seed, index in ((1, 7), (1, 7), (2, 7), (1, 8))]
     assert drawn[0] == drawn[1]
     assert len(set(drawn)) == 3
 
 
 @given(count=st.integers(1, 1353))
 @settings(deadline=None, max_examples=30)
-def test_a_reduced_ring_has_as_many_positions_as_asked(count: int) -> None:
+def test_a_reduced_ring_has_the_requested_size(count: int) -> None:
     indices = reduced_ring(count)
     assert indices == sorted(set(indices))
     assert len(indices) == count
@@ -76,5 +73,6 @@ def test_sixty_positions_cover_every_band_and_region() -> None:
 
 @pytest.mark.parametrize("count", [0, -1, 1354])
 def test_a_reduced_ring_of_an_impossible_size_is_refused(count: int) -> None:
-    with pytest.raises(ValueError, match="1353 positions"):
+    with pytest.raises(ConfigError, match="1353 positions") as refused:
         reduced_ring(count)
+    assert refused.value.field == "poses"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Simulated folders: what lies in them, and that a killed simulation goes on to the same manifest."""
+"""Simulated folders: their files, and resumption of a killed simulation to the same manifest."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from PIL import Image
 from doorstate.errors import ConfigError, DatasetError
 from doorstate.io.options import ReadOptions
 from doorstate.io.readers import read_cloud
+from doorstate.simulation.camera import DepthCamera
 from doorstate.simulation.frames import replay
-from doorstate.simulation.generate import PRESETS, pose_indices
 from doorstate.simulation.manifest import unflatten
-from doorstate.simulation.run import MANIFEST, is_simulated, read_settings, simulate_dataset
-from doorstate.simulation.sensor import DepthCamera
+from doorstate.simulation.presets import PRESETS
 from doorstate.simulation.settings import RAW_KINDS, SimulationSettings
+from doorstate.simulation.writer import MANIFEST, is_simulated, read_settings, simulate_dataset
 from doorstate.types import STATES
 
 SCRIPT = """
@@ -29,7 +29,7 @@ import sys
 from pathlib import Path
 
 from doorstate.simulation.settings import SimulationSettings
-from doorstate.simulation.run import simulate_dataset
+from doorstate.simulation.writer import simulate_dataset
 
 if __name__ == "__main__":
     settings = SimulationSettings.model_validate_json(Path(sys.argv[2]).read_text(encoding="utf-8"))
@@ -42,12 +42,12 @@ def settings_of(poses: int, width: int = 80, height: int = 60, seed: int = 4) ->
     return SimulationSettings(preset=preset, seed=seed, poses=poses)
 
 
-def test_a_manifest_of_three_states_a_pose(tmp_path: Path) -> None:
+def test_the_manifest_has_three_states_per_pose(tmp_path: Path) -> None:
     steps: list[tuple[int, int]] = []
     rows = simulate_dataset(tmp_path / "data", settings_of(10), 1, lambda *step: steps.append(step))
     assert steps == [(0, 2), (1, 2), (2, 2)]
     assert [(row["pose_id"], row["state"]) for row in rows] == [
-        (f"p{index:04d}", state) for index in pose_indices(10) for state in STATES
+        (f"p{index:04d}", state) for index in PRESETS["ogurob"].indices(10) for state in STATES
     ]
     assert sorted(path.name for path in (tmp_path / "data").iterdir()) == [MANIFEST, "simulation.json"]
     assert is_simulated(tmp_path / "data")
@@ -57,7 +57,7 @@ def test_a_manifest_of_three_states_a_pose(tmp_path: Path) -> None:
     assert steps == [(1, 1)]
 
 
-def test_raw_files_are_kept_where_asked(tmp_path: Path) -> None:
+def test_raw_files_are_written_on_request(tmp_path: Path) -> None:
     settings = SimulationSettings(preset=PRESETS["ogurob"], seed=1, poses=1, raw=RAW_KINDS)
     for line in simulate_dataset(tmp_path, settings, 1):
         row = unflatten(line)
@@ -76,7 +76,7 @@ def test_raw_files_are_kept_where_asked(tmp_path: Path) -> None:
     assert len(list(tmp_path.rglob("*.p[cn][dg]"))) == 9
 
 
-def test_goes_on_with_the_pieces_that_are_left(tmp_path: Path) -> None:
+def test_a_stopped_simulation_continues_with_the_missing_pieces(tmp_path: Path) -> None:
     folder = tmp_path / "data"
     whole = simulate_dataset(tmp_path / "undisturbed", settings_of(20), 1)
 
@@ -96,7 +96,7 @@ def test_goes_on_with_the_pieces_that_are_left(tmp_path: Path) -> None:
     assert not (folder / "pieces").exists()
 
 
-def test_pieces_left_beside_a_whole_manifest_are_cleared_away(tmp_path: Path) -> None:
+def test_pieces_beside_a_complete_manifest_are_removed(tmp_path: Path) -> None:
     rows = simulate_dataset(tmp_path, settings_of(1), 1)
     (tmp_path / "pieces").mkdir()
     (tmp_path / "pieces" / "00000.csv").write_text("old", encoding="utf-8")
@@ -104,7 +104,7 @@ def test_pieces_left_beside_a_whole_manifest_are_cleared_away(tmp_path: Path) ->
     assert not (tmp_path / "pieces").exists()
 
 
-def test_goes_on_after_a_kill_and_leaves_no_worker_behind(tmp_path: Path) -> None:
+def test_a_killed_simulation_continues_and_leaves_no_worker(tmp_path: Path) -> None:
     settings = settings_of(48, width=320, height=240)
     script, options, folder = tmp_path / "simulate.py", tmp_path / "options.json", tmp_path / "data"
     script.write_text(SCRIPT, encoding="utf-8")
@@ -119,33 +119,36 @@ def test_goes_on_after_a_kill_and_leaves_no_worker_behind(tmp_path: Path) -> Non
         # Workers inherited the pipe: it ends when the last of them has.
         parent.communicate(timeout=30)
     assert not (folder / MANIFEST).exists()
-    left = len(list(folder.glob("pieces/[0-9]*.csv")))
-    assert 1 <= left < 6
+    finished = len(list(folder.glob("pieces/[0-9]*.csv")))
+    assert 1 <= finished < 6
     steps: list[tuple[int, int]] = []
     simulate_dataset(folder, settings, 1, lambda *step: steps.append(step))
-    assert steps[0] == (left, 6)
+    assert steps[0] == (finished, 6)
     simulate_dataset(tmp_path / "undisturbed", settings, 1)
     assert (folder / MANIFEST).read_bytes() == (tmp_path / "undisturbed" / MANIFEST).read_bytes()
 
 
-def test_another_simulation_or_other_files_are_not_written_over(tmp_path: Path) -> None:
+def test_a_folder_with_other_contents_is_refused(tmp_path: Path) -> None:
     simulate_dataset(tmp_path / "data", settings_of(1), 1)
-    for other in (settings_of(2), settings_of(1, seed=5), settings_of(1, width=81)):
-        with pytest.raises(ConfigError, match="holds a simulation with other settings"):
-            simulate_dataset(tmp_path / "data", other, 1)
-    with pytest.raises(ConfigError, match="holds something else"):
+    for changed in (settings_of(2), settings_of(1, seed=5), settings_of(1, width=81)):
+        with pytest.raises(ConfigError, match="other settings"):
+            simulate_dataset(tmp_path / "data", changed, 1)
+    with pytest.raises(ConfigError, match="something else"):
         simulate_dataset(tmp_path, settings_of(1), 1)
     (tmp_path / "file").touch()
-    with pytest.raises(ConfigError, match="holds something else"):
+    with pytest.raises(ConfigError, match="something else"):
         simulate_dataset(tmp_path / "file", settings_of(1), 1)
     (tmp_path / "empty").mkdir()
     assert len(simulate_dataset(tmp_path / "empty", settings_of(1), 1)) == 3
 
 
-def test_settings_that_are_missing_or_damaged_are_named(tmp_path: Path) -> None:
-    with pytest.raises(DatasetError, match=r"holds no simulation\.json"):
+def test_missing_or_damaged_settings_are_refused_with_their_path(tmp_path: Path) -> None:
+    with pytest.raises(DatasetError) as missing:
         read_settings(tmp_path)
-    (tmp_path / "simulation.json").write_text('{"seed": 1', encoding="utf-8")
-    with pytest.raises(DatasetError, match=r"simulation\.json: ") as caught:
-        read_settings(tmp_path)
-    assert "\n" not in str(caught.value)
+    assert missing.value.path == tmp_path
+    for text in ('{"seed": 1', '{"preset": {"name": "colourful"}, "seed": 1}'):
+        (tmp_path / "simulation.json").write_text(text, encoding="utf-8")
+        with pytest.raises(DatasetError) as damaged:
+            read_settings(tmp_path)
+        assert damaged.value.path == tmp_path / "simulation.json"
+        assert "\n" not in str(damaged.value)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Each kind of wall without a door keeps the rule that tells it from one (docs/data-card.md), in every scene drawn."""
+"""Walls without a door: every drawn feature keeps the rule that sets it apart from a door (docs/data-card.md)."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from doorstate.simulation.no_door import FEATURES, Feature, feature_boxes
+from doorstate.simulation.presets import PRESETS, draw_rows
 from doorstate.simulation.scene import Box
-from doorstate.simulation.scene_rows import SCENE_PRESETS, draw_scene
+from doorstate.simulation.scene.feature import FEATURES, Feature, feature_boxes
 from doorstate.types import Part
 
-SCENES = [draw_scene(SCENE_PRESETS["no-door"], 0, index)[0].scene for index in range(300)]
+SCENES = [draw_rows(PRESETS["no-door"], 0, index)[0].scene for index in range(300)]
 
 
 def features(kind: str) -> Iterator[tuple[Feature, list[Box]]]:
@@ -23,7 +23,7 @@ def features(kind: str) -> Iterator[tuple[Feature, list[Box]]]:
 
 
 def solid(boxes: list[Box], x: np.ndarray, y: float, z: np.ndarray) -> np.ndarray:
-    """(X, Z) whether the points of a grid at depth y lie in a box."""
+    """Return the mask (X, Z) of grid points at depth y that lie in a box."""
     grid = np.stack(np.meshgrid(x, [y], z, indexing="ij"), axis=-1)[:, 0]
     assert all(box.yaw_rad == 0 for box in boxes)
     inside = [(np.abs(grid - box.center_m) <= np.array(box.size_m) / 2).all(axis=-1) for box in boxes]
@@ -31,25 +31,25 @@ def solid(boxes: list[Box], x: np.ndarray, y: float, z: np.ndarray) -> np.ndarra
 
 
 def across(low: float, high: float) -> np.ndarray:
-    """Forty places between, a hair from the ends."""
+    """Return 40 coordinates from low to high, just inside the ends."""
     return np.linspace(low + 1e-6, high - 1e-6, 40)
 
 
 @pytest.mark.parametrize("kind", FEATURES)
-def test_nothing_of_it_is_a_leaf_or_a_frame(kind: str) -> None:
+def test_features_have_neither_leaf_nor_frame(kind: str) -> None:
     drawn = list(features(kind))
     assert len(drawn) > 20
-    assert all(not {Part.LEAF, Part.FRAME} & {box.part for box in boxes} for _, boxes in drawn)
+    assert not any({Part.LEAF, Part.FRAME} & {box.part for box in boxes} for _, boxes in drawn)
 
 
-def test_a_wall_has_nothing_in_it() -> None:
+def test_a_plain_wall_is_solid() -> None:
     for feature, boxes in features("wall"):
         assert len(boxes) == 1
         assert solid(boxes, across(-3, 3), -feature.wall_thickness_m / 2, across(0, 2.3)).all()
 
 
 @pytest.mark.parametrize("kind", ["inner_corner", "outer_corner"])
-def test_the_wall_before_a_corner_has_nothing_in_it(kind: str) -> None:
+def test_the_wall_before_a_corner_is_solid(kind: str) -> None:
     for feature, boxes in features(kind):
         corner, thickness = feature.corner_m, feature.wall_thickness_m
         assert 0.25 <= abs(corner) <= 1.0
@@ -57,14 +57,14 @@ def test_the_wall_before_a_corner_has_nothing_in_it(kind: str) -> None:
         before, beyond = sorted((corner, -3 * side)), sorted((corner + 0.31 * side, corner + 2 * side))
         assert solid(boxes, across(*before), -thickness / 2, across(0, 2.3)).all()
         assert not solid(boxes, across(*beyond), -thickness / 2, across(0, 2.3)).any()
-        # The other wall: beyond the corner and towards the robot, or before it and away from it.
+        # The second wall: beyond the corner towards the robot, or before it away from the robot.
         inner = kind == "inner_corner"
-        other = sorted((corner, corner + (side if inner else -side) * thickness))
-        assert solid(boxes, across(*other), 1.0 if inner else -1.0, across(0, 2.3)).all()
-        assert not solid(boxes, across(*other), -1.0 if inner else 1.0, across(0, 2.3)).any()
+        second = sorted((corner, corner + (side if inner else -side) * thickness))
+        assert solid(boxes, across(*second), 1.0 if inner else -1.0, across(0, 2.3)).all()
+        assert not solid(boxes, across(*second), -1.0 if inner else 1.0, across(0, 2.3)).any()
 
 
-def test_a_cupboard_stands_out_of_a_whole_wall() -> None:
+def test_a_cupboard_projects_from_a_solid_wall() -> None:
     for feature, boxes in features("cupboard"):
         walls = [box for box in boxes if box.part == Part.WALL]
         half = feature.width_m / 2
@@ -73,10 +73,10 @@ def test_a_cupboard_stands_out_of_a_whole_wall() -> None:
         front = [box for box in boxes if box.part == Part.OTHER]
         behind_the_face = feature.depth_m - 0.001
         covered = solid(front, across(-half, half), behind_the_face, across(0.1, feature.top_m - 0.01))
-        assert covered.mean() > 0.9  # but for the gaps between fronts
+        assert covered.mean() > 0.9  # except for the gaps between fronts
 
 
-def test_below_a_window_there_is_half_a_metre_of_wall() -> None:
+def test_the_wall_below_a_window_is_half_a_metre_high() -> None:
     for feature, boxes in features("window"):
         half = feature.width_m / 2
         assert feature.bottom_m >= 0.5
@@ -84,7 +84,7 @@ def test_below_a_window_there_is_half_a_metre_of_wall() -> None:
         assert below.all()
 
 
-def test_a_niche_has_a_whole_back() -> None:
+def test_a_niche_has_a_solid_back() -> None:
     for feature, boxes in features("niche"):
         half, height = feature.width_m / 2, across(feature.bottom_m, feature.top_m)
         assert 0.15 <= feature.depth_m <= 0.60
@@ -92,7 +92,7 @@ def test_a_niche_has_a_whole_back() -> None:
         assert solid(boxes, across(-half, half), -feature.depth_m - 0.001, height).all()
 
 
-def test_a_passage_is_free_from_the_floor_up() -> None:
+def test_a_passage_is_open_from_the_floor_up() -> None:
     for feature, boxes in features("passage"):
         half = feature.width_m / 2
         assert feature.width_m >= 0.8

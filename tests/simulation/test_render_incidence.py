@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a rendering tells of its boxes: angle of incidence, material, what is behind glass; cameras off centre."""
+"""Incidence, materials and glass of renderings; cameras off centre."""
 
 from __future__ import annotations
 
@@ -11,17 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from doorstate.io.camera import Intrinsics
+from doorstate.simulation.camera import CameraPose, DepthCamera
+from doorstate.simulation.render import NO_BOX, cut_range, incidence, is_made_of, render, render_behind_glass
 from doorstate.simulation.scene import Box
-from doorstate.simulation.sensor import (
-    NO_BOX,
-    CameraPose,
-    DepthCamera,
-    cut_range,
-    incidence,
-    is_made_of,
-    render,
-    render_behind_glass,
-)
 from doorstate.types import Part
 from tests.simulation import naive_caster
 
@@ -32,7 +24,7 @@ PANE = Box(Part.LEAF, (2.0, 0.0, 0.0), (0.01, 1.0, 50.0), material="glass")
 
 
 def angle_to_face(box: Box, pose: CameraPose, row: int, column: int, depth_m: float) -> float:
-    """By the face that the hit point lies nearest to, relative to nothing but the box's own frame."""
+    """Return the angle to the face nearest to the hit point, computed in the box's frame."""
     ray = naive_caster.pixel_ray(row, column, pose, CAMERA)
     hit = tuple(a + depth_m * b - c for a, b, c in zip(pose[:3], ray, box.center_m, strict=True))
     local, direction = (naive_caster.turn_z(vector, -box.yaw_rad) for vector in (hit, ray))
@@ -55,17 +47,17 @@ def test_incidence_is_the_angle_between_the_ray_and_the_face_it_hits(seed: int) 
     ]
     inside = [(np.abs(np.array(pose[:3]) - box.center_m) < 3).all() for box in boxes]
     boxes = [box for box, holds_camera in zip(boxes, inside, strict=True) if not holds_camera]
-    seen = render(boxes, pose, CAMERA)
-    found = incidence(seen, boxes, pose, CAMERA)
-    assert ((found >= 0) & (found <= np.float32(math.pi / 2))).all()
-    for row, column in np.argwhere(seen.box != NO_BOX).tolist():
-        box = boxes[seen.box[row, column]]
-        expected = angle_to_face(box, pose, row, column, float(seen.depth_m[row, column]))
-        # On an edge of the box, either face is right: the hit point, a float32, tells no more.
-        assert found[row, column] == pytest.approx(expected, abs=1e-4) or on_edge(
-            seen.depth_m, row, column, box, pose
+    rendered = render(boxes, pose, CAMERA)
+    angles = incidence(rendered, boxes, pose, CAMERA)
+    assert ((angles >= 0) & (angles <= np.float32(math.pi / 2))).all()
+    for row, column in np.argwhere(rendered.box != NO_BOX).tolist():
+        box = boxes[rendered.box[row, column]]
+        expected = angle_to_face(box, pose, row, column, float(rendered.depth_m[row, column]))
+        # At an edge of the box either face is right, because depth is float32.
+        assert angles[row, column] == pytest.approx(expected, abs=1e-4) or on_edge(
+            rendered.depth_m, row, column, box, pose
         )
-    assert (found[seen.box == NO_BOX] == 0).all()
+    assert (angles[rendered.box == NO_BOX] == 0).all()
 
 
 def on_edge(depth_m: np.ndarray, row: int, column: int, box: Box, pose: CameraPose) -> bool:
@@ -78,24 +70,26 @@ def on_edge(depth_m: np.ndarray, row: int, column: int, box: Box, pose: CameraPo
 
 
 def test_incidence_of_a_wall_ahead_is_the_angle_off_the_axis() -> None:
-    found = incidence(render([WALL], LEVEL, CAMERA), [WALL], LEVEL, CAMERA)
+    angles = incidence(render([WALL], LEVEL, CAMERA), [WALL], LEVEL, CAMERA)
     right = (np.arange(18) - CAMERA.cx)[None, :] / CAMERA.fx
     down = (np.arange(14) - CAMERA.cy)[:, None] / CAMERA.fy
-    np.testing.assert_allclose(found, np.arctan(np.hypot(right, down)), atol=1e-6)
+    np.testing.assert_allclose(angles, np.arctan(np.hypot(right, down)), atol=1e-6)
 
 
 def test_incidence_of_a_floor_is_the_complement_of_the_ray_below_the_horizon() -> None:
     floor = Box(Part.FLOOR, (0.0, 0.0, -1.05), (50.0, 50.0, 0.1))
-    seen = render([floor], LEVEL, CAMERA)
-    found = incidence(seen, [floor], LEVEL, CAMERA)
+    rendered = render([floor], LEVEL, CAMERA)
+    angles = incidence(rendered, [floor], LEVEL, CAMERA)
     right = (np.arange(18) - CAMERA.cx)[None, :] / CAMERA.fx
     up = (CAMERA.cy - np.arange(14))[:, None] / CAMERA.fy
-    below = np.isfinite(seen.depth_m)
-    np.testing.assert_allclose(found[below], np.arccos(-up / np.sqrt(1 + right**2 + up**2))[below], atol=1e-6)
-    assert (found[~below] == 0).all()
+    below = np.isfinite(rendered.depth_m)
+    np.testing.assert_allclose(
+        angles[below], np.arccos(-up / np.sqrt(1 + right**2 + up**2))[below], atol=1e-6
+    )
+    assert (angles[~below] == 0).all()
 
 
-def test_behind_glass_is_the_next_opaque_surface_with_its_own_number() -> None:
+def test_glass_is_replaced_by_the_opaque_surface_behind_it() -> None:
     boxes = [PANE, WALL]
     front, behind = render(boxes, LEVEL, CAMERA), render_behind_glass(boxes, LEVEL, CAMERA)
     pane = is_made_of("glass", front, boxes)
@@ -110,7 +104,7 @@ def test_behind_glass_is_the_next_opaque_surface_with_its_own_number() -> None:
     assert not is_made_of("glass", behind, boxes).any()
 
 
-def test_what_is_too_near_is_made_of_no_glass() -> None:
+def test_glass_nearer_than_the_range_is_cut() -> None:
     boxes = [PANE, WALL]
     cut = cut_range(render(boxes, LEVEL, CAMERA), DepthCamera(min_depth_m=2.5))
     assert is_made_of("glass", render(boxes, LEVEL, CAMERA), boxes).any()
@@ -118,7 +112,7 @@ def test_what_is_too_near_is_made_of_no_glass() -> None:
     assert not is_made_of("glass", cut, boxes).any()
 
 
-def test_what_is_cut_belongs_to_no_box_and_is_made_of_nothing() -> None:
+def test_pixels_out_of_range_have_neither_box_nor_material() -> None:
     boxes = [PANE, WALL]
     cut = cut_range(render(boxes, LEVEL, CAMERA), DepthCamera(max_depth_m=2.5))
     lost = np.isnan(cut.depth_m)
@@ -128,9 +122,8 @@ def test_what_is_cut_belongs_to_no_box_and_is_made_of_nothing() -> None:
     assert (is_made_of("matte", cut, boxes) == 0).all()
 
 
-def test_a_camera_off_centre_says_so_and_an_ordinary_one_says_nothing_new() -> None:
+def test_cameras_off_centre_keep_their_centre() -> None:
     camera = DepthCamera(cx_px=300.25, cy_px=17.0)
     assert (camera.intrinsics().cx, camera.intrinsics().cy) == (300.25, 17.0)
     assert camera.intrinsics().fx == DepthCamera().intrinsics().fx
     assert DepthCamera.model_validate(camera.model_dump()) == camera
-    assert list(DepthCamera().model_dump()) == ["width", "height", "hfov_deg", "min_depth_m", "max_depth_m"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A camera that is not level: rolled, pitched, and its points turned back."""
+"""Rendering with rolled and pitched cameras, and levelling of their points."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ from hypothesis import strategies as st
 
 from doorstate.io.camera import Intrinsics
 from doorstate.io.depth import depth_to_points
+from doorstate.simulation.camera import CameraPose
 from doorstate.simulation.frames import level
+from doorstate.simulation.render import render
 from doorstate.simulation.scene import Box
-from doorstate.simulation.sensor import CameraPose, render
 from doorstate.types import Part
 from tests.simulation import naive_caster
 
@@ -32,18 +33,18 @@ def test_a_tilted_camera_equals_a_loop_over_rays_and_boxes(yaw: float, pitch: fl
     ]
     pose = CameraPose(0.0, 0.0, 0.0, yaw, pitch, roll)
     depth, part = naive_caster.cast(boxes, pose, CAMERA)
-    found = render(boxes, pose, CAMERA)
-    np.testing.assert_allclose(found.depth_m, depth, rtol=1e-6)
-    np.testing.assert_array_equal(found.part, part)
+    rendered = render(boxes, pose, CAMERA)
+    np.testing.assert_allclose(rendered.depth_m, depth, rtol=1e-6)
+    np.testing.assert_array_equal(rendered.part, part)
 
 
 @given(pitch=st.floats(0, 0.6), roll=angles)
 @settings(deadline=None, max_examples=40)
 def test_levelled_points_of_a_floor_lie_on_the_floor(pitch: float, roll: float) -> None:
     floor = Box(Part.FLOOR, (0.0, 0.0, -1.05), (50.0, 50.0, 0.1))
-    seen = render([floor], CameraPose(0.0, 0.0, 0.0, 0.7, pitch, roll), CAMERA)
-    points = level(depth_to_points(seen.depth_m, CAMERA), pitch, roll)
-    heights = points[np.isfinite(seen.depth_m)][:, 2]
+    rendered = render([floor], CameraPose(0.0, 0.0, 0.0, 0.7, pitch, roll), CAMERA)
+    points = level(depth_to_points(rendered.depth_m, CAMERA), pitch, roll)
+    heights = points[np.isfinite(rendered.depth_m)][:, 2]
     assert len(heights) > 30
     np.testing.assert_allclose(heights, -1.0, atol=1e-5)
 
@@ -66,4 +67,4 @@ def test_no_roll_leaves_every_bit_of_a_pose() -> None:
     assert pose._replace(roll_rad=0.0).rotation().tobytes() == pose.rotation().tobytes()
     nearly = pose._replace(roll_rad=1e-300).rotation()
     np.testing.assert_allclose(nearly, pose.rotation(), atol=1e-200)
-    assert CameraPose.of_degrees((1.0, 2.0, 1.0), 180.0, 90.0) == (1.0, 2.0, 1.0, math.pi, math.pi / 2, 0.0)
+    assert CameraPose.from_degrees((1.0, 2.0, 1.0), 180.0, 90.0) == (1.0, 2.0, 1.0, math.pi, math.pi / 2, 0.0)
