@@ -195,7 +195,7 @@ def test_prepare_takes_the_layout(root: Path, tmp_path: Path, run: Run) -> None:
     assert np.linalg.norm(again.clouds[0], axis=1).max() < 15
     code, _, err = run(*asked, "--roll", 90, "--out", tmp_path / "q")
     assert code == 2
-    assert err.startswith("doorstate: --layout says how its files are read")
+    assert "--layout" in err
     # The same folder without the layout is another preparation.
     assert "holds a preparation of something else" in run("prepare", part, "--points", 128, "--out", out)[2]
 

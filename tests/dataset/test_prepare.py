@@ -201,7 +201,7 @@ def test_thinned_clouds_are_those_that_a_predictor_samples(tiny_simulation: Path
         ("opening_angle_deg", "44.0", "renders differently than its manifest says"),
         ("distance_m", None, "column distance_m: Field required"),
         ("distance_m", "far", "column distance_m: "),
-        ("door.hinge", "top", "column door.hinge: "),
+        ("camera.width", "broad", "column camera.width: "),
     ],
 )
 def test_a_manifest_that_was_changed_is_noticed(

@@ -14,7 +14,7 @@ from doorstate.dataset import simulated
 from doorstate.dataset.prepare import Preparation, prepare_dataset
 from doorstate.dataset.simulated import Sampler, simulate_prepared
 from doorstate.errors import ConfigError
-from doorstate.simulation import run
+from doorstate.simulation import writer
 from doorstate.simulation.camera import DepthCamera
 from doorstate.simulation.presets import Preset, PresetName
 from doorstate.simulation.settings import SimulationSettings
@@ -71,13 +71,13 @@ def test_shards_and_a_killed_run_are_gone_on_with(
     settings, source = settings_of("varied", 10), tmp_path / "varied"
     simulate_shard(source, settings, Shard(2, 2), 1, callback=Sampler(asked_of(source)))
     rendered: list[int] = []
-    simulate = run._simulate_piece
+    simulate = writer._simulate_piece
 
-    def counted(piece: run._Piece, path: Path) -> None:
+    def counted(piece: writer._Piece, path: Path) -> None:
         rendered.append(len(piece.indices))
         simulate(piece, path)
 
-    monkeypatch.setattr(run, "_simulate_piece", counted)
+    monkeypatch.setattr(writer, "_simulate_piece", counted)
     monkeypatch.setattr(simulated, "prepare_dataset", None)  # would render again
     simulate_prepared(settings, asked_of(source), tmp_path / "out", 1)
     assert rendered == [8]
