@@ -22,7 +22,7 @@ import pytest
 
 from doorstate.io.pcd import write_pcd
 from doorstate.io.readers import read_cloud
-from doorstate.simulation.sensor import DepthCamera
+from doorstate.simulation.camera import DepthCamera
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = (
