@@ -27,7 +27,7 @@ def measure(weights: Path, clouds: LabelledClouds, progress: Progress) -> list[G
             path = Path(folder) / f"{card.network}.onnx"
             row: Group = {"network": card.network, "form": form, "clouds": len(clouds.points)}
             try:
-                found = export_onnx(path, network, card, clouds, int8="int8" in form, progress=progress)
+                parity = export_onnx(path, network, card, clouds, int8="int8" in form, progress=progress)
             except ExportError as error:
                 rows.append(row | {"reason": str(error)})
                 continue
@@ -35,10 +35,10 @@ def measure(weights: Path, clouds: LabelledClouds, progress: Progress) -> list[G
                 row
                 | {
                     "megabytes": path.stat().st_size / 1e6,
-                    "right": found.right,
-                    "right_in_torch": found.right_in_torch,
-                    "largest": found.largest,
-                    "rounding_in_torch": found.allowed / 2 if found.allowed > TOLERANCE else None,
+                    "right": parity.num_correct,
+                    "right_in_torch": parity.num_correct_torch,
+                    "largest": parity.max_difference,
+                    "rounding_in_torch": parity.tolerance / 2 if parity.tolerance > TOLERANCE else None,
                 }
             )
     return rows

@@ -40,7 +40,7 @@ def export(
     """
     from doorstate._files import check_writable
     from doorstate.cli.console import progress_bar, stdout
-    from doorstate.inference.export import TOLERANCE, check_installed, export_onnx
+    from doorstate.inference.export import TOLERANCE, check_export_packages, export_onnx
     from doorstate.inference.reference_clouds import reference_clouds
     from doorstate.networks.packaged import packaged_weights
     from doorstate.networks.weights import load_weights
@@ -48,7 +48,7 @@ def export(
     path = out or Path(f"{network}{'-int8' if int8 else ''}.onnx")
     if path.suffix != ".onnx":
         raise ConfigError(f"--out {path}: expected a .onnx file")
-    check_installed()
+    check_export_packages()
     check_writable(path)
     loaded, card = load_weights(weights or packaged_weights(network))
     if weights is not None and card.network != network:
@@ -59,13 +59,13 @@ def export(
         result = export_onnx(path, loaded, card, references, opset=opset, int8=int8, progress=progress)
     stdout.print(
         f"{path}: {path.stat().st_size / 1e6:.1f} MB, opset {opset}, {references.points.shape[1]} points\n"
-        f"{result.clouds} simulated clouds: largest difference of a probability from torch {result.largest:.1e}; "
-        f"{result.right} correct states, {result.right_in_torch} with torch",
+        f"{result.num_clouds} simulated clouds: largest difference of a probability from torch "
+        f"{result.max_difference:.1e}; {result.num_correct} correct states, {result.num_correct_torch} with torch",
         soft_wrap=True,
     )
-    if result.allowed > TOLERANCE and not int8:
+    if result.tolerance > TOLERANCE and not int8:
         stdout.print(
             f"differences above {TOLERANCE:.0e} come from rounding, which changes torch's own probabilities by "
-            f"{result.allowed / 2:.1e}",
+            f"{result.tolerance / 2:.1e}",
             soft_wrap=True,
         )

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: Apache-2.0
+"""ONNX graph of a network, from sampled points in metres to probabilities."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import torch
+from torch import Tensor, nn
+
+from doorstate.clouds.preparation import SCALE_M
+from doorstate.inference.backends.onnx_backend import INPUT, OUTPUT, head_names
+from doorstate.networks.base import PointNetwork
+from doorstate.networks.card import WeightsCard
+from doorstate.networks.head_layers import head_outputs
+from doorstate.networks.heads import STATE
+
+if TYPE_CHECKING:
+    from onnx import ModelProto
+
+_NO_SIZE_LIMIT = 2**30  # of a constant that the optimizer may fold
+
+
+class _MetresToProbabilities(nn.Module):
+    """Normalisation, network, temperature and softmax."""
+
+    def __init__(self, network: PointNetwork, card: WeightsCard) -> None:
+        super().__init__()
+        self.network = network
+        self.temperature = card.temperature
+
+    def forward(self, points: Tensor) -> tuple[Tensor, ...]:
+        # Bit for bit as clouds.preparation.normalize: a point just inside a ball must not be just outside.
+        centroid = points.mean(1, keepdim=True, dtype=torch.float64).to(torch.float32)
+        outputs = head_outputs(self.network, (points - centroid) / SCALE_M, with_points=False)
+        return ((outputs.pop(STATE) / self.temperature).softmax(1), *outputs.values())
+
+
+def build_graph(network: PointNetwork, card: WeightsCard, num_points: int, opset: int) -> ModelProto:
+    """Return the optimized graph of a network that takes any number of clouds of `num_points`.
+
+    Raises:
+        ValueError: the exporter cannot write this opset. Its own errors are of any type.
+    """
+    import onnxscript.optimizer
+
+    # Two clouds, because torch.export takes a size of one for a constant.
+    example = torch.linspace(-1, 1, 2 * num_points * 3).view(2, num_points, 3)
+    program = torch.onnx.export(
+        _MetresToProbabilities(network.eval(), card),
+        (example,),
+        dynamo=True,
+        opset_version=opset,
+        dynamic_shapes=({0: torch.export.Dim("batch")},),
+        input_names=[INPUT],
+        output_names=[OUTPUT, *head_names(card)],
+        verbose=False,
+    )
+    assert program is not None  # with `dynamo`
+    # Folds batch normalisation into weights once instead of at every start, and the quantizer finds matrices.
+    model: ModelProto = onnxscript.optimizer.optimize(
+        program.model_proto, input_size_limit=_NO_SIZE_LIMIT, output_size_limit=_NO_SIZE_LIMIT
+    )
+    if model.opset_import[0].version != opset:
+        raise ValueError(f"the exporter writes opset {model.opset_import[0].version}")
+    return model
