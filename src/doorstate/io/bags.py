@@ -226,7 +226,7 @@ class Bag:
                 f"depth images need a camera, and there is no CameraInfo in {name}",
                 path=self._path,
                 field="camera_info_topic",
-                hint="or give the intrinsics",
+                suggestions={"camera_info_topic": None, "intrinsics": None},
             )
         info = self._first(topic)
         try:

@@ -39,6 +39,7 @@ def points_from_depth(stored: NDArray[Any], options: ReadOptions) -> Points:
         raise CameraError(
             f"a depth image ({width} x {height} pixels) needs the intrinsics of its camera",
             field="intrinsics",
+            suggestions={"intrinsics": None},
         )
     if isinstance(intrinsics, Pinhole):
         intrinsics = _fit_to_image(intrinsics, width, height)
