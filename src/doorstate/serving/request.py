@@ -17,7 +17,12 @@ from doorstate.types import UNITS_M
 _FORMATS = [suffix.lstrip(".") for suffix in CLOUD_SUFFIXES]
 _FORMAT_OF_SUBTYPE = {"plain": "txt"}  # media subtypes that differ from the suffix
 # Parameters that are not spelled like the parameter of the library function they are passed to.
-_NAMES = {"roll_deg": "roll", "depth_scale_m": "depth_scale", "units_m": "units", "intrinsics": "fx, fy, cx and cy"}
+_NAMES = {
+    "roll_deg": "roll",
+    "depth_scale_m": "depth_scale",
+    "units_m": "units",
+    "intrinsics": "fx, fy, cx and cy",
+}
 
 
 class PredictQuery(BaseModel):
