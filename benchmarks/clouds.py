@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from doorstate._jobs import Progress
-from doorstate.clouds.preparation import normalize
+from doorstate.clouds.normalization import normalize
 from doorstate.dataset.store import open_dataset
 from doorstate.errors import ConfigError
 from doorstate.inference.reference_clouds import LabelledClouds, reference_clouds, reference_rows

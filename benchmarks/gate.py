@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from benchmarks.clouds import comparison_frames
 from benchmarks.store import Group
 from doorstate._jobs import Progress
-from doorstate.clouds.preparation import is_measured
+from doorstate.clouds.measured import is_measured
 from doorstate.evaluation.table import Table
 from doorstate.inference.network_predictor import NetworkPredictor
 from doorstate.inference.predictor import Predictor

@@ -39,7 +39,7 @@ def handedness(points: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.sign(np.linalg.det(points[:, :3].astype(np.float64)))
 
 
-def test_by_default_nothing_changes_at_all() -> None:
+def test_defaults_change_nothing() -> None:
     found = augmented(Augmentation())
     assert found.dtype == np.float32
     np.testing.assert_array_equal(found, POINTS)
@@ -96,7 +96,7 @@ def test_a_scale_of_the_height_alone_keeps_angles_seen_from_above() -> None:
     assert 0.799 < ratio.min() <= ratio.max() < 0.901
 
 
-def test_a_mirror_flips_left_and_right_of_as_many_as_asked() -> None:
+def test_a_mirror_flips_left_and_right_with_its_probability() -> None:
     found = augmented(Augmentation(mirror=1.0))
     np.testing.assert_array_equal(found, POINTS * np.array([1, -1, 1], np.float32))
     np.testing.assert_array_equal(handedness(found), -handedness(POINTS))
@@ -142,7 +142,5 @@ def test_impossible_settings_are_refused(wrong: dict[str, float]) -> None:
         (Augmentation(jitter=0.001), False, False),
     ],
 )
-def test_which_augmentations_keep_distances_and_which_their_order(
-    augmentation: Augmentation, similar: bool, rigid: bool
-) -> None:
+def test_rigid_and_similar_augmentations(augmentation: Augmentation, similar: bool, rigid: bool) -> None:
     assert (augmentation.is_similarity, augmentation.is_rigid) == (similar, rigid)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Farthest point order against a plain double loop; fpsample and the NumPy form give the same indices."""
+"""Farthest point order against a plain double loop; fpsample and NumPy give the same indices."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ both_forms = pytest.mark.parametrize("choose", [numpy_indices, fpsample_indices]
 
 
 def plain_order(points: Points, count: int) -> list[int]:
-    """Two loops and nothing clever, in float32; the start is the point farthest from below and behind the cloud."""
+    """Plain double loop in float32, starting with the point farthest from below and behind the cloud."""
     lowest = points.min(axis=0)
     anchor = lowest - np.float32(np.linalg.norm(points.max(axis=0) - lowest) + 1.0)
     nearest = [squared(point, anchor) for point in points]
@@ -63,7 +63,7 @@ def squared(one: Points, other: Points) -> np.float32:
 
 
 def distances_to_earlier(points: NDArray[np.floating], order: Indices) -> tuple[list[float], list[float]]:
-    """Squared distance of every chosen point to those before it, and the largest that any point had then."""
+    """Return the squared distance of each chosen point to the points before it, and the largest of all points then."""
     nearest = np.full(len(points), np.inf, points.dtype)
     own, largest = [], []
     for before, index in itertools.pairwise(order):
@@ -110,7 +110,7 @@ def test_a_tree_of_several_leaves_changes_nothing(choose: Choose) -> None:
     assert order[0] == plain_order(points, 1)[0]
 
 
-def test_worked_by_hand() -> None:
+def test_an_order_computed_by_hand() -> None:
     line = np.zeros((4, 3), np.float32)
     line[:, 0] = [0, 1, 2, 3]
     # 1 and 2 are equally far from both ends: without a tree the lower row goes first.
@@ -147,12 +147,12 @@ def clouds(draw: st.DrawFn) -> Points:
 
 @given(points=clouds())
 @settings(deadline=None, max_examples=60)
-def test_both_forms_give_the_same_indices(points: Points) -> None:
+def test_both_implementations_give_the_same_indices(points: Points) -> None:
     count = min(len(points), 150)
     np.testing.assert_array_equal(fpsample_indices(points, count), numpy_indices(points, count))
 
 
-def test_both_forms_split_their_trees_alike_where_points_lie_on_the_mean() -> None:
+def test_both_implementations_split_their_trees_alike_where_points_lie_on_the_mean() -> None:
     pytest.importorskip("fpsample")
     fpsample_form = sampling._fpsample_farthest_points
     rng = np.random.default_rng(0)
@@ -164,7 +164,7 @@ def test_both_forms_split_their_trees_alike_where_points_lie_on_the_mean() -> No
         np.testing.assert_array_equal(bucket_farthest_points(points, 8, height), expected)
 
 
-def test_both_forms_split_their_trees_alike_where_float32_sums_drift() -> None:
+def test_both_implementations_split_their_trees_alike_where_float32_sums_drift() -> None:
     pytest.importorskip("fpsample")
     fpsample_form = sampling._fpsample_farthest_points
     rng = np.random.default_rng(0)
@@ -175,7 +175,7 @@ def test_both_forms_split_their_trees_alike_where_float32_sums_drift() -> None:
 
 
 @pytest.mark.parametrize("number", [4, 17])
-def test_both_forms_give_the_same_indices_of_a_whole_frame(number: int) -> None:
+def test_both_implementations_give_the_same_indices_of_a_whole_frame(number: int) -> None:
     points = gazebo_cloud(number)
     assert len(points) > 150_000
     np.testing.assert_array_equal(fpsample_indices(points, 400), numpy_indices(points, 400))
@@ -239,6 +239,6 @@ def test_the_order_survives_turning_mirroring_and_scaling(seed: int, scale: floa
         (np.array([[0, 0, np.inf], [0, 0, 0]]), 1, "must be finite"),
     ],
 )
-def test_impossible_requests_are_refused(points: NDArray[np.float64], count: int, message: str) -> None:
+def test_impossible_arguments_are_refused(points: NDArray[np.float64], count: int, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         farthest_point_indices(points.astype(np.float32), count)

@@ -11,7 +11,7 @@ import torch
 from scipy.spatial.distance import pdist
 
 from doorstate.clouds.augmentation import Augmentation
-from doorstate.clouds.preparation import normalize
+from doorstate.clouds.normalization import normalize
 from doorstate.dataset.loader import Batch, CloudLoader
 from doorstate.dataset.store import PreparedDataset, open_dataset
 from doorstate.errors import ConfigError, DatasetError

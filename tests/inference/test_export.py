@@ -10,7 +10,8 @@ import onnx
 import pytest
 import torch
 
-from doorstate.clouds.preparation import CloudSpec, normalize, prepare_cloud
+from doorstate.clouds.normalization import normalize
+from doorstate.clouds.preparation import CloudSpec, prepare_cloud
 from doorstate.errors import ExportError
 from doorstate.inference.backends.onnx_backend import OnnxBackend
 from doorstate.inference.backends.torch_backend import TorchBackend

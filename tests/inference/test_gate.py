@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from benchmarks.gate import FAULTS, glass, without
 
-from doorstate.clouds.preparation import is_measured
+from doorstate.clouds.measured import is_measured
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import ConfigError
 from doorstate.inference.gate import Gate

@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 
 from doorstate.clouds.augmentation import Augmentation, apply_augmentation, draw_augmentation
-from doorstate.clouds.preparation import SCALE_M
+from doorstate.clouds.normalization import SCALE_M
 from doorstate.dataset.store import PreparedDataset
 from doorstate.networks.heads import (
     HEADS,

@@ -121,7 +121,7 @@ def test_files_of_a_finished_run(finished: Path, roles: dict[str, Role]) -> None
 
 
 def test_saved_weights_give_the_saved_predictions(finished: Path, small_dataset: PreparedDataset) -> None:
-    from doorstate.clouds.preparation import normalize
+    from doorstate.clouds.normalization import normalize
 
     network, card = load_weights(finished / "weights.safetensors")
     assert card.num_points == 128

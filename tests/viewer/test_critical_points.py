@@ -8,7 +8,8 @@ import pytest
 import torch
 from numpy.typing import NDArray
 
-from doorstate.clouds.preparation import CloudSpec, normalize, prepare_cloud
+from doorstate.clouds.normalization import normalize
+from doorstate.clouds.preparation import CloudSpec, prepare_cloud
 from doorstate.networks import create_network, list_networks
 from doorstate.networks.base import PointNetwork
 from doorstate.types import Points

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From any file to points in progressive order: one path for training, export and robot."""
+"""Preparation, sampling and augmentation of clouds."""

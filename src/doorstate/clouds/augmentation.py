@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Changes of a batch of clouds that keep the door's state; drawn first, then applied, so that they can be replayed.
+"""Augmentation of a batch of clouds that keeps the door's state; drawn first and then applied, so it can be replayed.
 
 Scale is the same along x and y: stretching one against the other would change the opening angle, which is the label
 (tan a' = s_y / s_x tan a).
@@ -19,11 +19,11 @@ from doorstate.types import Points
 
 
 class Augmentation(FrozenModel):
-    """How far clouds are changed; every default changes nothing. Lengths are in units of the normalised cloud."""
+    """Ranges of random changes; the defaults change nothing. Lengths are in units of the normalised cloud."""
 
-    yaw_deg: float = Field(default=0.0, ge=0, le=180)  # turned about z by U(-yaw, yaw)
+    yaw_deg: float = Field(default=0.0, ge=0, le=180)  # rotated about z by U(-yaw, yaw)
     mirror: float = Field(default=0.0, ge=0, le=1)  # probability of y -> -y
-    scale: tuple[float, float] = (1.0, 1.0)  # x, y and z alike, unless scale_z is given
+    scale: tuple[float, float] = (1.0, 1.0)  # x, y and z alike, unless scale_z is set
     scale_z: tuple[float, float] | None = None
     shift: float = Field(default=0.0, ge=0)  # per axis U(-shift, shift)
     tilt_deg: float = Field(default=0.0, ge=0)  # about x and y N(0, tilt), cut at 3 sigma
@@ -32,17 +32,17 @@ class Augmentation(FrozenModel):
 
     @property
     def is_similarity(self) -> bool:
-        """Whether all distances of a cloud stay in proportion, so that nearest neighbours stay nearest."""
+        """True if all distances of a cloud stay in proportion, so that nearest neighbours stay nearest."""
         return self.jitter == 0 and self.scale_z is None
 
     @property
     def is_rigid(self) -> bool:
-        """Whether all distances of a cloud stay the same."""
+        """True if all distances of a cloud stay the same."""
         return self.is_similarity and self.scale == (1.0, 1.0)
 
 
 class AugmentationDraw(NamedTuple):
-    """What was drawn for a batch of B clouds of N points."""
+    """Random changes drawn for a batch of B clouds of N points."""
 
     linear: NDArray[np.float32]  # (B, 3, 3), applied to column vectors
     shift: NDArray[np.float32]  # (B, 1, 3)
@@ -55,10 +55,10 @@ def draw_augmentation(
     """Draw the changes of one batch.
 
     Args:
-        augmentation: how far clouds are changed.
-        rng: what is drawn from.
-        clouds: B, how many there are.
-        points: N of each.
+        augmentation: ranges of the changes.
+        rng: random generator.
+        clouds: B, number of clouds.
+        points: N, points of each cloud.
     """
     yaw = rng.uniform(-1, 1, clouds) * math.radians(augmentation.yaw_deg)
     tilt_sigma = math.radians(augmentation.tilt_deg)
@@ -84,7 +84,7 @@ def apply_augmentation(points: Points, draw: AugmentationDraw) -> Points:
 
 
 def _rotation(angle_rad: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
-    """(B, 3, 3) right-handed rotations about x, y or z."""
+    """Return right-handed rotations (B, 3, 3) about x, y or z."""
     first, second = (axis + 1) % 3, (axis + 2) % 3
     rotation = np.zeros((len(angle_rad), 3, 3))
     rotation[:, axis, axis] = 1.0

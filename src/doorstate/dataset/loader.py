@@ -17,7 +17,7 @@ from doorstate.clouds.augmentation import (
     apply_augmentation,
     draw_augmentation,
 )
-from doorstate.clouds.preparation import centroids, normalize
+from doorstate.clouds.normalization import centroids, normalize
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import ConfigError
 from doorstate.networks.heads import IGNORE_INDEX, POINT_HEADS, augment_targets, head_targets

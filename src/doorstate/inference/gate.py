@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from doorstate.clouds.preparation import MIN_POINTS, is_measured
+from doorstate.clouds.measured import is_measured
+from doorstate.clouds.preparation import MIN_POINTS
 from doorstate.errors import ConfigError
 from doorstate.inference.abstention import Abstention
 from doorstate.inference.holes import hole_share

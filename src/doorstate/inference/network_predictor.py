@@ -10,14 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from doorstate.clouds.preparation import (
-    MIN_POINTS,
-    CloudSpec,
-    PreparedCloud,
-    check_one_cloud,
-    is_image,
-    prepare_cloud,
-)
+from doorstate.clouds.preparation import MIN_POINTS, CloudSpec, PreparedCloud, prepare_cloud
+from doorstate.clouds.shape import check_single_cloud, is_image
 from doorstate.errors import CloudContentError, ConfigError, TooFewPointsError
 from doorstate.inference.abstention import Abstention
 from doorstate.inference.backends import Backend, load_backend, run_by_size
@@ -124,7 +118,7 @@ class NetworkPredictor(Predictor):
             CloudContentError: a cloud that is none or not in metres, or one cloud in place of several.
         """
         started = self.clock()
-        samples = [self._sample(check_one_cloud(cloud)) for cloud in _several(clouds)]
+        samples = [self._sample(check_single_cloud(cloud)) for cloud in _several(clouds)]
         accepted = [sample.points for sample in samples if sample.abstention is None]
         outputs = iter(run_by_size(self.backend, accepted))
         milliseconds = (self.clock() - started) * 1000 / max(1, len(samples))

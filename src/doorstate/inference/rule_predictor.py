@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from doorstate.clouds.preparation import check_one_cloud
+from doorstate.clouds.shape import check_single_cloud
 from doorstate.errors import TooFewPointsError
 from doorstate.inference.abstention import Abstention
 from doorstate.inference.gate import DEFAULT_GATE, Gate
@@ -57,7 +57,7 @@ class RulePredictor(Predictor):
             CloudContentError: not one cloud.
         """
         started = time.perf_counter()
-        cloud = check_one_cloud(cloud)
+        cloud = check_single_cloud(cloud)
         num_points = len(measured(cloud))
         if num_points == 0:
             error = TooFewPointsError("nothing was measured: the cloud holds no points")

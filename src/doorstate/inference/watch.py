@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from doorstate.clouds.preparation import is_measured
+from doorstate.clouds.measured import is_measured
 from doorstate.errors import CameraError, DoorstateError, summarize_exception
 from doorstate.inference.abstention import Abstention
 from doorstate.inference.prediction import Prediction

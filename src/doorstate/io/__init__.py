@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Readers: files, depth images and recordings to clouds in metres."""
+"""Files, depth images, bags and ROS messages, read as clouds in metres in the body frame."""

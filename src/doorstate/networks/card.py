@@ -9,7 +9,8 @@ from pydantic import Field
 
 from doorstate import __version__
 from doorstate._models import FrozenModel
-from doorstate.clouds.preparation import SCALE_M, CloudSpec
+from doorstate.clouds.normalization import SCALE_M
+from doorstate.clouds.preparation import CloudSpec
 from doorstate.types import STATES
 
 

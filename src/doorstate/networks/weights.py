@@ -11,7 +11,7 @@ from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 
 from doorstate._files import atomic_path
-from doorstate.clouds.preparation import SCALE_M
+from doorstate.clouds.normalization import SCALE_M
 from doorstate.errors import WeightsError
 from doorstate.networks import create_network
 from doorstate.networks.base import PointNetwork

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from doorstate._models import FrozenModel
-from doorstate.clouds.preparation import is_measured
+from doorstate.clouds.measured import is_measured
 from doorstate.types import DoorState, Points
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from pydantic import Field
 from scipy.spatial import cKDTree
 
-from doorstate.clouds.preparation import is_measured
+from doorstate.clouds.measured import is_measured
 from doorstate.rules.base import Detection, Parameters, Rule, RuleResult
 from doorstate.rules.plan_lines import Flags, Floats, Line, strongest_line
 from doorstate.rules.planes import thin

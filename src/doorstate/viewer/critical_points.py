@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional
 
-from doorstate.clouds.preparation import normalize
+from doorstate.clouds.normalization import normalize
 from doorstate.networks.base import PointNetwork
 from doorstate.networks.dgcnn import DGCNN
 from doorstate.networks.kernels.ops import first_winner

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
-from doorstate.clouds.preparation import centroids
+from doorstate.clouds.normalization import centroids
 from doorstate.errors import WeightsError, missing_extra, summarize_exception
 from doorstate.inference.backends.base import Outputs
 from doorstate.networks.card import WeightsCard

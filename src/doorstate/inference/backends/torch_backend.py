@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import torch
 
-from doorstate.clouds.preparation import centroids, normalize
+from doorstate.clouds.normalization import centroids, normalize
 from doorstate.inference.backends.base import Outputs
 from doorstate.networks.base import PointNetwork
 from doorstate.networks.card import WeightsCard

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import torch
 from torch import Tensor, nn
 
-from doorstate.clouds.preparation import SCALE_M
+from doorstate.clouds.normalization import SCALE_M
 from doorstate.inference.backends.onnx_backend import INPUT, OUTPUT, head_names
 from doorstate.networks.base import PointNetwork
 from doorstate.networks.card import WeightsCard
@@ -30,7 +30,7 @@ class _MetresToProbabilities(nn.Module):
         self.temperature = card.temperature
 
     def forward(self, points: Tensor) -> tuple[Tensor, ...]:
-        # Bit for bit as clouds.preparation.normalize: a point just inside a ball must not be just outside.
+        # Bit for bit as clouds.normalization.normalize: a point just inside a ball must not be just outside.
         centroid = points.mean(1, keepdim=True, dtype=torch.float64).to(torch.float32)
         outputs = head_outputs(self.network, (points - centroid) / SCALE_M, with_points=False)
         return ((outputs.pop(STATE) / self.temperature).softmax(1), *outputs.values())

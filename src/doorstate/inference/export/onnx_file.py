@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from doorstate import __version__
 from doorstate._files import atomic_path
 from doorstate._jobs import Progress, no_progress
-from doorstate.clouds.preparation import SCALE_M
+from doorstate.clouds.normalization import SCALE_M
 from doorstate.errors import ExportError, missing_extra, summarize_exception
 from doorstate.inference.backends.onnx_backend import CARD_KEY
 from doorstate.inference.export.graph import build_graph

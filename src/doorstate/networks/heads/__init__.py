@@ -2,7 +2,7 @@
 """Heads: outputs of a network besides the state. Imports no torch.
 
 The numbers of a head have three forms. *Outputs* leave its last linear layer. *Values* are decoded outputs, and
-targets, in the network's units and axes: clouds are centred and divided by 3 m (clouds.preparation.normalize), angles
+targets, in the network's units and axes: clouds are centred and divided by 3 m (clouds.normalization.normalize), angles
 are in radians. *Columns* are values in metres and degrees in the sensor frame, named as in tables. NaN is a number
 that the manifest does not hold.
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from doorstate.clouds.augmentation import AugmentationDraw
-from doorstate.clouds.preparation import SCALE_M
+from doorstate.clouds.normalization import SCALE_M
 from doorstate.networks.heads.shared import (
     angle_error_deg,
     direction_loss,

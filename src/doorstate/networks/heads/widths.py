@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from doorstate.clouds.augmentation import AugmentationDraw
-from doorstate.clouds.preparation import SCALE_M
+from doorstate.clouds.normalization import SCALE_M
 from doorstate.networks.heads.shared import mean, plan_transform
 from doorstate.networks.heads.spec import Column, Floats, HeadSpec, Metric, States, Values
 from doorstate.types import Points
