@@ -3,19 +3,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
-from doorstate._jobs import Progress
 from doorstate.clouds.normalization import normalize
 from doorstate.dataset.store import open_dataset
 from doorstate.errors import ConfigError
 from doorstate.inference.reference_clouds import LabelledClouds, reference_clouds, reference_rows
-from doorstate.simulation.frames import Frame, replay
+from doorstate.simulation.frames import replay
 from doorstate.simulation.presets import PRESETS, draw_rows
-from doorstate.simulation.row import Row
 from doorstate.types import Points
 
 
@@ -61,11 +58,3 @@ def dataset_clouds(folder: Path, count: int, num_points: int) -> Clouds:
         )
     chosen = np.linspace(0, len(dataset) - 1, count).astype(np.int64)
     return Clouds(np.array(dataset.clouds[chosen, :num_points]), dataset.labels[chosen])
-
-
-def comparison_frames(count: int, progress: Progress) -> Iterator[tuple[Row, Frame]]:
-    """Doors that no weights were trained on, as the camera sees them."""
-    for done, row in enumerate(reference_rows(count)):
-        progress(done, count)
-        yield row, replay(row)
-    progress(count, count)

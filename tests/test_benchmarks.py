@@ -6,7 +6,6 @@ from __future__ import annotations
 import json
 import math
 import os
-import shutil
 import subprocess
 import sys
 from contextlib import nullcontext
@@ -15,13 +14,10 @@ from typing import Any
 
 import pytest
 import torch
-from benchmarks.gate import FAULTS
-from benchmarks.onnx import onnx_table
 
 from doorstate._jobs import no_progress
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import ConfigError, RunError
-from doorstate.networks.packaged import packaged_weights
 from doorstate.rules import list_rules
 
 REPOSITORY = Path(__file__).resolve().parents[1]
@@ -251,47 +247,6 @@ class Dying:
 
     def die(self) -> None:
         os.kill(os.getpid(), 9)
-
-
-def test_exported_files_are_set_beside_torch(tmp_path: Path) -> None:
-    comparison = tmp_path / "runs" / "pointnet2" / "fold0"
-    comparison.mkdir(parents=True)
-    shutil.copy(packaged_weights("pointnet2"), comparison / "weights.safetensors")
-    small = ("--networks", "pointnet2", "--points", 128, "--clouds", 3)
-    code, output, errors = run("onnx", "--runs", tmp_path, *small, "--out", tmp_path / "out")
-    assert (code, errors) == (0, "")
-    _, (exact, rounded), markdown = stored(tmp_path / "out", "onnx")
-    assert exact["largest"] <= 1e-4 < rounded["largest"]
-    assert exact["right"] == exact["right_in_torch"] == rounded["right_in_torch"]
-    assert rounded["megabytes"] < exact["megabytes"] / 2
-    assert "| pointnet2 | onnxruntime int8 |" in markdown
-    assert "Exported networks beside torch" in output
-
-
-def test_a_file_that_is_not_written_has_its_row() -> None:
-    table = onnx_table([{"network": "dgcnn", "form": "onnxruntime", "clouds": 3, "reason": "too far apart"}])
-    assert table.rows == (("dgcnn", "onnxruntime", "not written", *["–"] * 4),)
-
-
-def test_thinning_compares_answers(tmp_path: Path) -> None:
-    code, output, errors = run("thinning", "--count", 3, "--out", tmp_path)
-    assert (code, errors) == (0, "")
-    _, rows, markdown = stored(tmp_path, "thinning")
-    assert len(rows) == 3
-    assert all(
-        sum(row[k]["probabilities"].values()) == pytest.approx(1) for row in rows for k in ("some", "all")
-    )
-    assert "| 3 |" in markdown
-    assert "Sampling from some pixels" in output
-
-
-def test_gate_counts_what_faults_do(tmp_path: Path) -> None:
-    code, output, errors = run("gate", "--count", 2, "--out", tmp_path)
-    assert (code, errors) == (0, "")
-    _, rows, _ = stored(tmp_path, "gate")
-    assert len(rows) == 2 * len(FAULTS)
-    assert all(row["gated"] in (None, row["careless"]) for row in rows), "the gate only takes answers away"
-    assert "nine tenths of the columns missing" in output
 
 
 def test_the_service_is_loaded_by_every_number_of_clients(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks.gate import FAULTS, glass, without
+from paper.measurements.gate import FAULTS, glass, without
 
 from doorstate.clouds.measured import is_measured
 from doorstate.dataset.store import PreparedDataset

@@ -5,13 +5,19 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
-import json
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from benchmarks.sensors import PUBLISHED_SIGMA_M, cropped, measure, measured, only, sensors_table, wall
+from paper.measurements.sensors import (
+    PUBLISHED_SIGMA_M,
+    SensorResult,
+    cropped,
+    measure_depth,
+    measure_sensors,
+    sensors_table,
+    wall,
+    with_stages,
+)
 from pydantic import ValidationError
 
 from doorstate._jobs import no_progress
@@ -23,7 +29,6 @@ from doorstate.simulation.render import NO_BOX, Render, cut_range, render_behind
 from doorstate.simulation.scene import Box, Door, Opening, Scene, scene_boxes
 from doorstate.types import Part
 
-REPOSITORY = Path(__file__).resolve().parents[3]
 POSE = CameraPose.from_degrees((0.4, 2.2, 1.0), -97.0, 3.0)
 # Hinged on the right: the free edge, before what is behind it, is the leaf's left one, where shadows fall.
 BOXES = scene_boxes(Scene(door=Door(hinge="right"), has_ceiling=False), Opening(angle_deg=50))
@@ -39,22 +44,20 @@ STEPS_MM = {1.0: 2.9, 2.0: 11.5, 3.0: 26.0}
 
 
 @pytest.fixture(scope="module")
-def checks() -> list[dict[str, Any]]:
-    return measure(range(3), no_progress)
+def checks() -> list[SensorResult]:
+    return measure_sensors(range(3), no_progress)
 
 
-def test_everything_published_is_met_within_ten_per_cent(checks: list[dict[str, Any]]) -> None:
-    apart = {
-        (row["sensor"], row["measure"], row["at"]): row["measured"] / row["published"] - 1 for row in checks
-    }
+def test_everything_published_is_met_within_ten_per_cent(checks: list[SensorResult]) -> None:
+    apart = {(row.sensor, row.quantity, row.condition): row.measured / row.published - 1 for row in checks}
     assert len(apart) == len(checks) > 60
     assert {each: off for each, off in apart.items() if not abs(off) < 0.1} == {}
-    assert {row["sensor"] for row in checks} == set(SENSORS) - {"none"}
+    assert {row.sensor for row in checks} == set(SENSORS) - {"none"}
     assert len(sensors_table(checks).rows) == len(checks)
 
 
-def test_axial_noise_and_steps_are_those_of_the_table_in_millimetres(checks: list[dict[str, Any]]) -> None:
-    found = {(row["sensor"], row["measure"], row["at"]): row["measured"] for row in checks}
+def test_axial_noise_and_steps_are_those_of_the_table_in_millimetres(checks: list[SensorResult]) -> None:
+    found = {(row.sensor, row.quantity, row.condition): row.measured for row in checks}
     assert set(TABLE_MM) == set(SENSORS) - {"none"}
     for name, line in TABLE_MM.items():
         for depth_m, sigma_mm in line.items():
@@ -62,19 +65,6 @@ def test_axial_noise_and_steps_are_those_of_the_table_in_millimetres(checks: lis
             assert found[name, "axial noise", f"{depth_m:g} m"] == pytest.approx(sigma_mm, rel=0.1)
     for depth_m, step_mm in STEPS_MM.items():
         assert found["xtion", "step of disparity", f"{depth_m:g} m"] == pytest.approx(step_mm, rel=0.1)
-
-
-def test_the_page_shows_what_was_stored() -> None:
-    page = (REPOSITORY / "docs" / "sensors.md").read_text(encoding="utf-8")
-    stored = json.loads((REPOSITORY / "docs" / "benchmarks" / "sensors.json").read_text(encoding="utf-8"))
-    rows = stored["groups"]["all"]["rows"]
-    for name in set(SENSORS) - {"none"}:
-        cells = [
-            f"{row['published']:.1f} / {row['measured']:.1f}"
-            for row in rows
-            if (row["sensor"], row["measure"]) == (name, "axial noise") and "degrees" not in row["at"]
-        ]
-        assert f"| `{name}` | {' | '.join(cells)} |" in page
 
 
 def small(name: str) -> tuple[SensorModel, DepthCamera]:
@@ -139,7 +129,7 @@ def test_stages_lose_pixels_and_bring_none_back() -> None:
     model, camera = small("xtion")
     pinhole = camera.intrinsics()
     seen = render_behind_glass(BOXES, POSE, pinhole)
-    hidden = distort(only(model, "second_view"), seen, BOXES, POSE, pinhole, 4).depth_m
+    hidden = distort(with_stages(model, "second_view"), seen, BOXES, POSE, pinhole, 4).depth_m
     everything = distort(model, seen, BOXES, POSE, pinhole, 4).depth_m
     assert np.isnan(hidden).any()
     assert np.isnan(everything[np.isnan(hidden)]).all()
@@ -147,7 +137,7 @@ def test_stages_lose_pixels_and_bring_none_back() -> None:
 
 
 def test_labels_move_with_measurements_at_ragged_edges() -> None:
-    model = only(SENSORS["xtion"], "lateral")
+    model = with_stages(SENSORS["xtion"], "lateral")
     boxes = [Box(Part.LEAF, (2.0, 5.0, 0.0), (0.02, 10.0, 20.0)), wall(3.0)]
     pinhole = cropped(model, 30, 200)
     ahead = CameraPose(0.0, 0.0, 0.0, 0.0)
@@ -160,8 +150,8 @@ def test_labels_move_with_measurements_at_ragged_edges() -> None:
 
 def test_glass_is_looked_through_or_gives_nothing() -> None:
     pane = Box(Part.LEAF, (2.0, 0.0, 0.0), (0.01, 1.0, 50.0), material="glass")
-    boxes, model = [pane, wall(3.0)], only(SENSORS["xtion"], "materials")
-    image = measured(model, boxes, cropped(model, 640, 480), [0])[0]
+    boxes, model = [pane, wall(3.0)], with_stages(SENSORS["xtion"], "materials")
+    image = measure_depth(model, boxes, cropped(model, 640, 480), [0])[0]
     before_pane = np.abs(np.arange(640) - 319.5) < 0.5 / 1.995 * model.camera.intrinsics().fx
     assert set(np.unique(image[~np.isnan(image)]).tolist()) == {3.0}
     assert not np.isnan(image[:, ~before_pane]).any()
@@ -174,7 +164,7 @@ def test_glass_is_looked_through_or_gives_nothing() -> None:
 def test_the_camera_of_deepdoors2_is_a_d435_that_was_turned() -> None:
     ours, turned = SENSORS["deepdoors2"].camera.intrinsics(), DEEPDOORS2.turned_clockwise()
     assert dataclasses.astuple(ours) == pytest.approx(dataclasses.astuple(turned), abs=1e-9)
-    image = measured(SENSORS["deepdoors2"], [wall(2.0)], ours, [0])[0]
+    image = measure_depth(SENSORS["deepdoors2"], [wall(2.0)], ours, [0])[0]
     levels = image[~np.isnan(image)] * 16
     np.testing.assert_array_equal(levels, np.rint(levels))
     # The second imager is below, so the band without depth is above.
@@ -191,7 +181,7 @@ def test_a_closed_door_sinks_into_the_noise_with_distance() -> None:
         boxes = scene_boxes(Scene(door=Door(), has_ceiling=False), Opening())
         seen = render_behind_glass(boxes, pose, model.camera.intrinsics())
         depth_m = distort(
-            only(model, "axial", "disparity_steps"), seen, boxes, pose, model.camera.intrinsics(), 0
+            with_stages(model, "axial", "disparity_steps"), seen, boxes, pose, model.camera.intrinsics(), 0
         ).depth_m
         casing = (seen.part == Part.FRAME) & (np.abs(seen.depth_m - (distance_m - 0.015)) < 1e-3)
         leaf = (seen.part == Part.LEAF) & (np.abs(seen.depth_m - distance_m) < 1e-3)
@@ -207,7 +197,7 @@ def test_a_closed_door_sinks_into_the_noise_with_distance() -> None:
 def test_a_gaussian_of_any_deviation_is_found(name: str) -> None:
     model = find_sensor(name)
     assert model.name == name
-    image = measured(model, [wall(2.0)], cropped(model, 160, 120), [0])
+    image = measure_depth(model, [wall(2.0)], cropped(model, 160, 120), [0])
     assert image.std() == pytest.approx(float(name.partition(":")[2]), rel=0.03)
 
 

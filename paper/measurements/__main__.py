@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Command line of the measurements: each writes one Markdown table."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from doorstate.evaluation.table import Table
+
+Out = Annotated[Path, typer.Option(help="Folder of the table.")]
+Network = Annotated[str, typer.Option(help="Packaged weights.")]
+Count = Annotated[int, typer.Option(help="Number of simulated doors, in all states.", min=1)]
+
+app = typer.Typer(no_args_is_help=True, add_completion=False, rich_markup_mode=None, help=__doc__)
+
+
+@app.command()
+def gate(
+    out: Out = Path("docs/benchmarks"), network: Network = "ogurob-pointnet2", count: Count = 100
+) -> None:
+    """Clouds that the gate rejects, and closed doors reported open, when parts of the cloud are missing."""
+    from doorstate.cli.console import progress_bar
+
+    from .gate import gate_table, measure_gate
+
+    with progress_bar("gate") as progress:
+        table = gate_table(measure_gate(network, count, progress))
+    _write(table, out / "gate.md")
+
+
+@app.command()
+def thinning(
+    out: Out = Path("docs/benchmarks"), network: Network = "ogurob-pointnet2", count: Count = 300
+) -> None:
+    """Agreement of predictions from a part of the pixels with predictions from all pixels."""
+    from doorstate.cli.console import progress_bar
+
+    from .thinning import measure_thinning, thinning_table
+
+    with progress_bar("thinning") as progress:
+        table = thinning_table(measure_thinning(network, count, progress))
+    _write(table, out / "thinning.md")
+
+
+@app.command()
+def sensors(
+    out: Out = Path("docs/benchmarks"),
+    frames: Annotated[int, typer.Option(help="Frames of each measurement.", min=1)] = 16,
+) -> None:
+    """Noise, steps, shadows and missing pixels of the sensor models beside the published figures."""
+    from doorstate.cli.console import progress_bar
+
+    from .sensors import measure_sensors, sensors_table
+
+    with progress_bar("sensors") as progress:
+        table = sensors_table(measure_sensors(range(frames), progress))
+    _write(table, out / "sensors.md")
+
+
+@app.command()
+def export(
+    out: Out = Path("docs/benchmarks"),
+    runs: Annotated[Path, typer.Option(help="Comparison with the weights to export.")] = Path("runs/paper"),
+    fold: Annotated[int, typer.Option(help="Fold of the weights.", min=0, max=4)] = 0,
+    points: Annotated[int, typer.Option(help="Points of the exported networks.", min=128)] = 4096,
+    count: Count = 102,
+) -> None:
+    """Agreement of exported networks with torch, in float32 and with 8-bit matrices."""
+    from doorstate.cli.console import progress_bar
+    from doorstate.inference.reference_clouds import reference_clouds
+    from doorstate.networks import list_networks
+    from doorstate.training.run_folder import run_of
+
+    from .export import export_table, measure_export
+
+    with progress_bar("Simulating") as progress:
+        clouds = reference_clouds(count, points, progress)
+    rows = []
+    for name in list_networks():
+        with progress_bar(name) as progress:
+            rows += measure_export(run_of(runs, name, fold).weights, clouds, progress)
+    _write(export_table(rows), out / "onnx.md")
+
+
+def _write(table: Table, path: Path) -> None:
+    from doorstate._files import write_text
+
+    write_text(path, table.to_markdown())
+    typer.echo(f"{path} written")
+
+
+if __name__ == "__main__":
+    app(prog_name="python -m paper.measurements")
