@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Real bags for tests and the fuzzer, written with rosbags."""
+"""Bags for tests, written with rosbags."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ KINDS = ("bag", "db3", "mcap")
 
 @dataclass
 class Message:
-    """A message on its way into a bag; recorded a millisecond after its stamp."""
+    """Message to be written; its time of recording is a millisecond after its stamp."""
 
     topic: str
     type: str
@@ -28,7 +28,7 @@ class Message:
 
 
 def cloud(topic: str, points: NDArray[np.floating], stamp_ns: int = START_NS, **changes: Any) -> Message:
-    """PointCloud2 of (N, 3) or (H, W, 3) points, with an intensity behind them."""
+    """PointCloud2 of points (N, 3) or (H, W, 3), with a field intensity."""
     height, width = points.shape[:2] if points.ndim == 3 else (1, len(points))
     filled = np.concatenate([points, np.ones((*points.shape[:-1], 1))], -1).astype("<f4")
     fields = {
@@ -47,7 +47,7 @@ def cloud(topic: str, points: NDArray[np.floating], stamp_ns: int = START_NS, **
 def image(
     topic: str, pixels: NDArray[Any], encoding: str, stamp_ns: int = START_NS, **changes: Any
 ) -> Message:
-    """Image of (H, W) pixels, byte order and all."""
+    """Image of pixels (H, W), in their byte order."""
     fields = {
         "height": pixels.shape[0],
         "width": pixels.shape[1],
@@ -60,7 +60,7 @@ def image(
 
 
 def compressed_image(topic: str, data: bytes, image_format: str, stamp_ns: int = START_NS) -> Message:
-    """CompressedImage as it is."""
+    """CompressedImage."""
     return Message(
         topic, "CompressedImage", {"format": image_format, "data": np.frombuffer(data, np.uint8)}, stamp_ns
     )
@@ -86,12 +86,12 @@ def camera_info(
 
 
 def text(topic: str) -> Message:
-    """Something that is no cloud."""
+    """String message."""
     return Message(topic, "String", {"data": "hello"}, START_NS)
 
 
 def write_bag(folder: Path, kind: str, messages: Sequence[Message], compression: str = "") -> Path:
-    """Write ROS 1 (`bag`) or ROS 2 (`db3`, `mcap`); gives the file, or the folder of ROS 2."""
+    """Write a ROS 1 (`bag`) or ROS 2 bag (`db3`, `mcap`), and return its file, or the folder of ROS 2."""
     from rosbags.rosbag1 import Writer as Writer1
     from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
     from rosbags.rosbag2 import Writer as Writer2
@@ -117,21 +117,15 @@ def write_bag(folder: Path, kind: str, messages: Sequence[Message], compression:
             if message.topic not in connections:
                 full = _full_name(message.type)
                 connections[message.topic] = writer.add_connection(message.topic, full, typestore=store)
-            content = serialized(message, is_ros1)
+            content = _serialized(message, is_ros1)
             writer.write(connections[message.topic], message.stamp_ns + 1_000_000, content)
     return path
 
 
-def serialized(message: Message, is_ros1: bool = False) -> bytes:
-    """A message as it is in a bag."""
+def _serialized(message: Message, is_ros1: bool) -> bytes:
     store, full = _store(is_ros1), _full_name(message.type)
     built = _build(store, message, full, is_ros1)
     return bytes((store.serialize_ros1 if is_ros1 else store.serialize_cdr)(built, full))
-
-
-def deserialized(content: bytes, message_type: str) -> Any:
-    """A message of ROS 2 from its bytes; raises whatever rosbags does."""
-    return _store(False).deserialize_cdr(content, _full_name(message_type))
 
 
 def _full_name(message_type: str) -> str:

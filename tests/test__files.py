@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files appear whole or not at all, and tables come back as they were written."""
+"""Atomic writing of files, and tables that are read as they were written."""
 
 from __future__ import annotations
 
@@ -25,9 +25,7 @@ def test_the_target_appears_when_the_block_ends(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt])
-def test_an_error_leaves_the_old_file_and_nothing_half_written(
-    tmp_path: Path, error: type[BaseException]
-) -> None:
+def test_an_error_keeps_the_old_file(tmp_path: Path, error: type[BaseException]) -> None:
     target = tmp_path / "text.txt"
     write_text(target, "old")
 
@@ -50,34 +48,34 @@ def test_a_block_that_writes_nothing_is_an_error_and_keeps_the_old_file(tmp_path
     assert target.read_text(encoding="utf-8") == "old"
 
 
-def test_where_nothing_can_be_written_is_one_line_before_and_when_it_is_tried(tmp_path: Path) -> None:
+def test_unwritable_targets_are_output_errors(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     for target in (tmp_path / "file" / "page.html", tmp_path):
-        with pytest.raises(OutputError, match="cannot be written"):
-            check_writable(target)
-        with pytest.raises(OutputError, match="cannot be written"):
-            write_text(target, "text")
+        for write in (check_writable, lambda path: write_text(path, "text")):
+            with pytest.raises(OutputError) as caught:
+                write(target)
+            assert caught.value.path == target
 
 
-def test_asking_whether_something_can_be_written_makes_nothing(tmp_path: Path) -> None:
+def test_check_writable_creates_nothing(tmp_path: Path) -> None:
     check_writable(tmp_path / "new" / "folder" / "page.html")
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_full_disk_is_one_line_and_another_missing_file_is_itself(tmp_path: Path) -> None:
-    refused = pytest.raises(OutputError, match=r"a\.txt: cannot be written \(No space left on device\)")
+def test_a_full_disk_is_an_output_error_and_errors_of_other_files_are_not(tmp_path: Path) -> None:
+    refused = pytest.raises(OutputError, match="No space left on device")
     with refused, atomic_path(tmp_path / "a.txt"):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
     with pytest.raises(PermissionError), atomic_path(tmp_path / "a.txt"):
         raise PermissionError(errno.EACCES, "denied", "another.txt")
 
 
-def test_text_is_utf_8_whatever_the_locale(tmp_path: Path) -> None:
+def test_text_is_utf_8_in_every_locale(tmp_path: Path) -> None:
     write_text(tmp_path / "a.txt", "yarı açık kapı")
     assert (tmp_path / "a.txt").read_bytes() == "yarı açık kapı".encode()
 
 
-def test_a_folder_is_vacant_until_something_whole_is_in_it(tmp_path: Path) -> None:
+def test_folders_with_only_temporary_files_are_vacant(tmp_path: Path) -> None:
     assert is_vacant(tmp_path / "new")
     (tmp_path / ".123.tmp.manifest.csv").touch()
     assert is_vacant(tmp_path)
@@ -86,7 +84,7 @@ def test_a_folder_is_vacant_until_something_whole_is_in_it(tmp_path: Path) -> No
     assert not is_vacant(tmp_path / "notes.txt")
 
 
-def test_rows_of_different_columns_share_one_header(tmp_path: Path) -> None:
+def test_rows_with_different_columns_share_one_header(tmp_path: Path) -> None:
     write_csv(tmp_path / "a.csv", [{"a": "1"}, {"b": 'two, "2"', "a": "line\nbreak"}])
     assert read_csv(tmp_path / "a.csv") == [{"a": "1", "b": ""}, {"a": "line\nbreak", "b": 'two, "2"'}]
 
@@ -96,12 +94,13 @@ def test_rows_of_different_columns_share_one_header(tmp_path: Path) -> None:
     [None, b"a,b\n1\n", b"a,b\n1,2,3\n", b"a,b\n\xff\xfe,2\n", b'a,b\n"1"2,3\n'],
     ids=["missing", "short", "long", "not UTF-8", "stray quote"],
 )
-def test_a_file_that_is_no_such_table_is_refused_by_name(tmp_path: Path, content: bytes | None) -> None:
+def test_other_files_are_dataset_errors(tmp_path: Path, content: bytes | None) -> None:
     path = tmp_path / "manifest.csv"
     if content is not None:
         path.write_bytes(content)
-    with pytest.raises(DatasetError, match=r"manifest\.csv: "):
+    with pytest.raises(DatasetError) as caught:
         read_csv(path)
+    assert caught.value.path == path
 
 
 def test_a_table_saved_by_a_spreadsheet_has_the_same_columns(tmp_path: Path) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files appear whole or not at all: write beside the target, then rename. Rows of text as CSV."""
+"""Atomic writing of files (write beside the target, then rename), and tables of text as CSV."""
 
 from __future__ import annotations
 
@@ -18,52 +18,52 @@ from doorstate.errors import DatasetError, OutputError
 
 @contextmanager
 def atomic_path(target: Path) -> Iterator[Path]:
-    """Give a temporary path beside `target` that replaces it when the block ends without an error.
+    """Yield a temporary path beside `target`, which replaces the target if the block ends without an error.
 
     Raises:
-        OutputError: it cannot be written.
+        OutputError: the target cannot be written.
     """
     check_writable(target)
     target.parent.mkdir(parents=True, exist_ok=True)
-    # The target's ending stays last: writers such as numpy and matplotlib choose the format by it.
+    # The suffix stays the same, because numpy and matplotlib choose the format by it.
     temporary = target.with_name(f".{os.getpid()}.tmp.{target.name}")
     try:
         yield temporary
         temporary.replace(target)
     except OSError as error:
-        foreign = error.filename is not None and str(error.filename) != str(temporary)
-        if foreign or isinstance(error, FileNotFoundError):  # of the block itself
+        of_another_file = error.filename is not None and str(error.filename) != str(temporary)
+        if of_another_file or isinstance(error, FileNotFoundError):
             raise
-        raise OutputError(f"{target}: cannot be written ({error.strerror or error})") from error
+        raise OutputError(f"cannot be written ({error.strerror or error})", path=target) from error
     finally:
         temporary.unlink(missing_ok=True)
 
 
 def check_writable(target: Path) -> None:
-    """Ask before long work, and change nothing, whether a file and the folders above it could be made.
+    """Check, before long work and without changing anything, that a file and its folders could be created.
 
     Raises:
-        OutputError: it is a folder, or the nearest thing above it that exists is none or may not be written into.
+        OutputError: the target is a folder, or its nearest existing parent is no folder or not writable.
     """
-    above = next(folder for folder in target.absolute().parents if os.path.lexists(folder))
+    parent = next(folder for folder in target.absolute().parents if os.path.lexists(folder))
     if target.is_dir():
         reason = "it is a folder"
-    elif not above.is_dir():
-        reason = f"{above} is no folder"
-    elif not os.access(above, os.W_OK):
-        reason = f"nothing may be written into {above}"
+    elif not parent.is_dir():
+        reason = f"{parent} is no folder"
+    elif not os.access(parent, os.W_OK):
+        reason = f"{parent} is not writable"
     else:
         return
-    raise OutputError(f"{target}: cannot be written ({reason})")
+    raise OutputError(f"cannot be written ({reason})", path=target)
 
 
 def is_vacant(folder: Path) -> bool:
-    """Whether something new may be made here: nothing is there, or at most what a killed write left behind."""
+    """Return True if a folder does not exist, or holds nothing but temporary files of interrupted writes."""
     return not folder.exists() or (folder.is_dir() and all(".tmp." in path.name for path in folder.iterdir()))
 
 
 def write_text(target: Path, text: str) -> None:
-    """Write `text` as UTF-8 in one step."""
+    """Write `text` as UTF-8, atomically."""
     with atomic_path(target) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
@@ -78,14 +78,14 @@ def write_csv(path: Path, rows: Sequence[Mapping[str, str]]) -> None:
     """Write rows under the union of their columns, in order of appearance; compressed if the name ends in `.gz`."""
     names = list(dict.fromkeys(name for row in rows for name in row))
     text = io.StringIO(newline="")
-    # Before Python 3.13 the writer leaves a lone carriage return unquoted, which reads back as the end of a line.
-    returns = any("\r" in value for row in rows for value in (*row, *row.values()))
+    # Before Python 3.13 the writer does not quote a lone carriage return, which is then read as the end of a line.
+    has_returns = any("\r" in value for row in rows for value in (*row, *row.values()))
     writer = csv.DictWriter(
         text,
         names,
         restval="",
         lineterminator="\n",
-        quoting=csv.QUOTE_ALL if returns else csv.QUOTE_MINIMAL,
+        quoting=csv.QUOTE_ALL if has_returns else csv.QUOTE_MINIMAL,
     )
     writer.writeheader()
     writer.writerows(rows)
@@ -104,10 +104,10 @@ def read_csv(path: Path) -> list[dict[str, str]]:
             reader = csv.DictReader(stream, strict=True)
             rows = list(reader)
     except (OSError, EOFError, zlib.error, UnicodeDecodeError, csv.Error) as error:
-        raise DatasetError(f"{path}: cannot be read as CSV ({error})") from error
+        raise DatasetError(f"cannot be read as CSV ({error})", path=path) from error
     for number, row in enumerate(rows, start=2):
         if None in row or None in row.values():
-            raise DatasetError(f"{path}: line {number} has another number of columns than the header")
+            raise DatasetError(f"line {number} has another number of columns than the header", path=path)
     return rows
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Long work in resumable pieces: each piece writes one file, whole or not at all, in any order, in any process."""
+"""Resumable jobs in pieces: each piece writes one file atomically, in any order, in any process."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from typing import NamedTuple, Self, TypeVar
 from doorstate.errors import ConfigError, RunError
 
 Piece = TypeVar("Piece")
-Progress = Callable[[int, int], None]  # (pieces done, pieces in all)
-_LOOK_EVERY_S = 0.2
+Progress = Callable[[int, int], None]  # (pieces done, total)
+_POLL_S = 0.2
 
 
 class Shard(NamedTuple):
@@ -51,12 +51,12 @@ def no_progress(done: int, total: int) -> None:
 
 
 def default_workers() -> int:
-    """One process per processor this process may use."""
+    """Return the number of processors that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def piece_paths(folder: Path, count: int, suffix: str) -> list[Path]:
-    """Where the pieces of a job lie."""
+    """Return the files of the pieces of a job."""
     return [folder / f"{number:05d}{suffix}" for number in range(count)]
 
 
@@ -67,10 +67,10 @@ def run_pieces(
     workers: int,
     progress: Progress = no_progress,
 ) -> None:
-    """Call `work(piece, path)` for every piece whose file is missing; a killed run goes on where it was.
+    """Call `work(piece, path)` for every piece whose file is missing, so that an interrupted job continues.
 
-    `work` must be a top-level function that writes `path` atomically. Its first error stops the job as soon as the
-    pieces in work are done, a key press of the user at once; finished pieces stay.
+    `work` must be a top-level function that writes `path` atomically. After its first error the job stops as soon as
+    the running pieces are done, after an interrupt at once; finished pieces are kept.
     """
     missing = [(piece, path) for piece, path in zip(pieces, paths, strict=True) if not path.exists()]
     done = len(pieces) - len(missing)
@@ -94,7 +94,7 @@ def run_pieces(
         except BaseException as error:
             if not isinstance(error, Exception):
                 stop.set()
-            # A second shutdown, by the with block, would not wait: workers would go on writing after the return.
+            # The with block alone would not wait for the workers, which would continue to write after the return.
             pool.shutdown(cancel_futures=True)
             if isinstance(error, BrokenProcessPool):
                 raise RunError(
@@ -105,14 +105,14 @@ def run_pieces(
 
 
 def _end_with_parent(stop: Event) -> None:
-    """Let a worker end when its parent is killed or stopped: an orphan would go on writing beside the restarted job."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides, and workers print no tracebacks
+    """End a worker when its parent is killed or stopped: an orphan would write beside the restarted job."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent handles it, and workers print no tracebacks
     parent = multiprocessing.parent_process()
     if parent is None:
         return
 
     def watch() -> None:
-        while parent.is_alive() and not stop.wait(_LOOK_EVERY_S):
+        while parent.is_alive() and not stop.wait(_POLL_S):
             pass
         os._exit(1)
 

@@ -10,10 +10,10 @@ _M_TRIM_THRESHOLD, _M_MMAP_MAX = -1, -4  # malloc.h of glibc
 
 
 def keep_freed_memory() -> None:
-    """Let this process reuse freed memory instead of giving it back after every tensor, where the C library is glibc.
+    """Keep freed memory in the process instead of returning it after every tensor, with glibc.
 
-    glibc maps every large block anew and the kernel fills it with zeros, which takes as long as the arithmetic on it:
-    a training step of PointNet++ is more than twice as quick without (paper/log.md).
+    glibc maps each large block again and the kernel fills it with zeros, which takes as long as the arithmetic on it.
+    Without that, a training step of PointNet++ is more than twice as fast (paper/log.md).
     """
     if not sys.platform.startswith("linux"):
         return

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The base of settings and rows: values that are checked once, do not change, and hold nothing unknown."""
+"""Base class of settings and rows."""
 
 from __future__ import annotations
 
@@ -7,6 +7,6 @@ from pydantic import BaseModel, ConfigDict
 
 
 class FrozenModel(BaseModel):
-    """A model whose fields cannot be set, and that takes no other ones."""
+    """Pydantic model without assignment and without unknown fields."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")

@@ -102,5 +102,5 @@ def _near_points(clean: Points, max_depth_m: float) -> NDArray[np.bool_]:
     return near
 
 
-def _too_few(found: str) -> TooFewPointsError:
-    return TooFewPointsError(f"too few points: {found}", expected=f"at least {MIN_POINTS}")
+def _too_few(counts: str) -> TooFewPointsError:
+    return TooFewPointsError(f"too few points: {counts}", expected=f"at least {MIN_POINTS}")
