@@ -19,8 +19,8 @@ from benchmarks.timing import step_s
 from doorstate._jobs import Progress
 from doorstate.evaluation.table import Table
 from doorstate.networks.dgcnn import DGCNN
-from doorstate.networks.kernels.ops import gather_rows
-from doorstate.networks.kernels.search import knn
+from doorstate.networks.kernels.gather import gather_rows
+from doorstate.networks.kernels.knn import knn
 from doorstate.training.run import torch_threads
 
 K = 20

@@ -23,7 +23,7 @@ from doorstate.networks.base import PointNetwork
 from doorstate.networks.card import WeightsCard
 from doorstate.networks.head_layers import add_heads
 from doorstate.networks.heads import HEADS
-from doorstate.networks.layers import set_batchnorm
+from doorstate.networks.layers.batch_norm import set_batchnorm
 
 SLOW = {"pointcnn"}
 

@@ -13,7 +13,7 @@ from torch import Tensor
 from doorstate.errors import CloudContentError, ConfigError
 from doorstate.networks import create_network, list_networks
 from doorstate.networks.base import PointNetwork
-from doorstate.networks.layers import RowBatchNorm
+from doorstate.networks.layers.batch_norm import RowBatchNorm
 from doorstate.networks.point2sequence import Point2Sequence
 from doorstate.networks.pointcnn import PointCNN
 from doorstate.networks.pointnet2 import PointNet2

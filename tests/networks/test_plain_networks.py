@@ -14,7 +14,7 @@ from torch import Tensor, nn
 
 from doorstate.networks import create_network
 from doorstate.networks.base import PointNetwork
-from doorstate.networks.layers import set_batchnorm
+from doorstate.networks.layers.batch_norm import set_batchnorm
 from tests.networks.plain_networks import PlainForm
 
 CASES: dict[str, tuple[str, dict[str, Any]]] = {

@@ -10,7 +10,7 @@ import torch
 from torch import Tensor, nn
 
 from doorstate.errors import ConfigError
-from doorstate.networks.kernels.search import knn
+from doorstate.networks.kernels.knn import knn
 from doorstate.networks.point2sequence import AREAS, Attention, LSTMCell, Point2Sequence
 
 
@@ -97,12 +97,12 @@ def test_areas_are_nested_and_ordered(network: Point2Sequence) -> None:
 
 def test_sequence_is_read_from_small_to_large(network: Point2Sequence) -> None:
     sequence = torch.randn(1, 3, 4, 128, generator=torch.Generator().manual_seed(0))
-    memory, query = network.regions(sequence)
+    memory, query = network.encode_decode(sequence)
     assert memory.shape == (1, 3, 4, 128)
     assert query.shape == (1, 3, 128)
     changed = sequence.clone()
     changed[:, :, 3] += 1
-    later, other = network.regions(changed)
+    later, other = network.encode_decode(changed)
     assert torch.equal(later[:, :, :3], memory[:, :, :3])
     assert not torch.equal(later[:, :, 3], memory[:, :, 3])
     assert not torch.equal(other, query)
@@ -122,7 +122,7 @@ def test_attention_reaches_the_output_unless_as_released(region_feature: str) ->
 def test_region_feature(region_feature: str) -> None:
     network = Point2Sequence(region_feature=region_feature).eval()
     points = clouds()
-    memory, query = network.regions(network.sequence(points, *network.neighbourhoods(points)))
+    memory, query = network.encode_decode(network.sequence(points, *network.neighbourhoods(points)))
     region = network.attention(memory, query) if region_feature == "attention" else query
     expected = network.globals(points, network.region(region))
     torch.testing.assert_close(network.features(points), expected)
@@ -159,5 +159,5 @@ def test_head_drops_six_of_ten() -> None:
 
 
 def test_an_unknown_region_feature_is_refused() -> None:
-    with pytest.raises(ConfigError, match="no region feature 'paper': use attention or released"):
+    with pytest.raises(ConfigError, match="unknown point2sequence region_feature 'paper'"):
         Point2Sequence(region_feature="paper")

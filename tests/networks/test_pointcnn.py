@@ -7,7 +7,7 @@ import pytest
 import torch
 from torch import Tensor, nn
 
-from doorstate.networks.kernels.search import knn
+from doorstate.networks.kernels.knn import knn
 from doorstate.networks.pointcnn import Level, PointCNN, XConv
 from tests.networks import plain
 

@@ -119,7 +119,7 @@ def test_order_after_the_centres_matters_only_to_full_balls() -> None:
 
 
 def test_an_unknown_variant_is_refused() -> None:
-    with pytest.raises(ConfigError, match="no variant 'mrg': use one of ssg, msg"):
+    with pytest.raises(ConfigError, match="unknown pointnet2 variant 'mrg'"):
         PointNet2(variant="mrg")
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Two ways to compute one thing, compared: values and gradients."""
+"""Comparison of a fast form with a literal one: values and gradients."""
 
 from __future__ import annotations
 
@@ -10,7 +10,15 @@ from torch import Tensor
 
 
 def rows(*shape: int, seed: int = 0) -> Tensor:
-    return torch.randn(*shape, generator=torch.Generator().manual_seed(seed)).double()
+    return random_rows(*shape, seed=seed).double()
+
+
+def random_rows(*shape: int, seed: int = 0) -> Tensor:
+    return torch.randn(*shape, generator=torch.Generator().manual_seed(seed))
+
+
+def random_indices(batch: int, queries: int, points: int, k: int) -> Tensor:
+    return torch.randint(0, points, (batch, queries, k), generator=torch.Generator().manual_seed(1))
 
 
 def assert_same(fast: Callable[..., Tensor], literal: Callable[..., Tensor], *inputs: Tensor) -> None:

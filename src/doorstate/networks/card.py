@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What weights say of themselves, in every kind of file; apart from `weights`, which needs torch."""
+"""Card of a weights file: the network it is for and how its clouds are prepared; needs no torch."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ from doorstate.types import STATES
 
 
 class WeightsCard(FrozenModel):
-    """What a weights file says of itself."""
+    """Network, preparation of clouds, calibration and origin of a weights file."""
 
     network: str
     network_options: dict[str, Any] = Field(default_factory=dict)
-    num_points: int  # trained with
-    default_points: int | None = Field(default=None, gt=0)  # fewer, that lose nothing
-    heads: tuple[str, ...] = ()  # answers besides the state
+    num_points: int  # per cloud in training
+    default_points: int | None = Field(default=None, gt=0)  # per cloud in use, if fewer are as good
+    heads: tuple[str, ...] = ()  # besides the state, by name (networks.heads)
     scale_m: float = SCALE_M
     states: tuple[str, ...] = STATES
-    max_depth_m: float | None = Field(default=None, gt=0)  # how far the camera of the training clouds saw
+    max_depth_m: float | None = Field(default=None, gt=0)  # range of the camera of the training clouds
     temperature: float = Field(default=1.0, gt=0)  # logits are divided by it (training.calibration)
-    abstain_below: float = Field(default=0.0, ge=0, lt=1)  # no state from a probability below this
+    abstain_below: float = Field(default=0.0, ge=0, lt=1)  # abstain if no state is more probable
     trained_on: str = ""
     doorstate_version: str = __version__
 
     @property
     def points(self) -> int:
-        """How many points to look at unless told otherwise."""
+        """Number of points per cloud in use."""
         return self.default_points or self.num_points
 
     @property

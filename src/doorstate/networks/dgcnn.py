@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""DGCNN: edge convolutions on a graph rebuilt in feature space (Wang et al., 2019, arXiv:1801.07829)."""
+"""DGCNN: edge convolutions on a graph that is rebuilt in feature space.
+
+Wang et al., 2019, arXiv:1801.07829, figure 3; without spatial transformer, as in the authors' PyTorch code.
+"""
 
 from __future__ import annotations
 
@@ -10,25 +13,20 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from doorstate.networks.base import Encoding, Neighbourhoods, PointNetwork
-from doorstate.networks.kernels.ops import (
-    full_precision,
-    gather_rows,
-    max_over_points,
-    neighbour_max,
-    neighbour_sum,
-)
-from doorstate.networks.kernels.search import knn, spatial_order
-from doorstate.networks.layers import PointHead, RowBatchNorm, set_batchnorm
+from doorstate.networks.kernels.edge_conv import edge_max, edge_moments
+from doorstate.networks.kernels.gather import gather_rows
+from doorstate.networks.kernels.knn import knn
+from doorstate.networks.kernels.max_over_points import max_over_points
+from doorstate.networks.kernels.precision import full_precision
+from doorstate.networks.kernels.spatial_order import spatial_order
+from doorstate.networks.layers.batch_norm import RowBatchNorm, set_batchnorm
+from doorstate.networks.layers.dense import PointHead
 
 _SLOPE = 0.2
 
 
 class EdgeConv(nn.Module):
-    """max over neighbours j of LeakyReLU(BatchNorm(W [x_j - x_i; x_i])), without building the edges' inputs.
-
-    The batch's statistics are known from the edges' mean and covariance, so BatchNorm folds into W = [A, B], and
-    W [x_j - x_i; x_i] = A x_j + (B - A) x_i: two products per point. LeakyReLU is monotone and follows the maximum.
-    """
+    """Edge convolution: max over neighbours j of LeakyReLU(BatchNorm(W [x_j - x_i; x_i]))."""
 
     def __init__(self, in_channels: int, out_channels: int) -> None:
         super().__init__()
@@ -36,64 +34,19 @@ class EdgeConv(nn.Module):
         self.norm = RowBatchNorm(out_channels)
 
     def forward(self, features: Tensor, indices: Tensor) -> Tensor:
-        """(B, N, C_out) of (B, N, C) features and (B, N, k) neighbours."""
+        """Return (B, N, C_out) of (B, N, C) features and (B, N, k) neighbours."""
         moments = edge_moments(features, indices) if self.training else None
         weight, bias = self.norm.fold(self.linear, moments, count=indices.numel())
-        difference, own = weight.chunk(2, dim=1)
-        neighbour = functional.linear(features, difference)  # (B, N, C_out): A x
-        centre = functional.linear(features, own - difference, bias)  # (B, N, C_out): (B - A) x
-        return functional.leaky_relu(neighbour_max(neighbour, indices) + centre, _SLOPE)
-
-
-def edge_moments(features: Tensor, indices: Tensor) -> tuple[Tensor, Tensor]:
-    """Mean and covariance of [x_j - x_i; x_i] over all edges of all clouds, without the edges.
-
-    Args:
-        features: (B, N, C) x.
-        indices: (B, N, k) neighbours j of each point i.
-
-    Returns:
-        (2C,) mean and (2C, 2C) covariance divided by the number of edges.
-    """
-    each = features.new_full((1,), 1 / indices.numel()).expand(len(indices), indices[0].numel())
-    share = (
-        features.new_zeros(indices.shape[:2]).scatter_add_(1, indices.flatten(1), each).view(-1, 1)
-    )  # (B * N, 1) of all edges
-    flat = features.flatten(0, 1)
-    mean = flat.mean(0)
-    flat = flat - mean  # centred, so that the squares do not cancel
-    around = neighbour_sum(flat.view_as(features), indices).flatten(0, 1)  # (B * N, C): sum of x_j
-    mean_end = (share * flat).sum(0)  # of x_j, where the mean of x_i is zero
-    end_end = (share * flat).T @ flat
-    end_own = around.T @ flat / indices.numel()
-    own_own = flat.T @ flat / len(flat)
-    step_own = end_own - own_own
-    step_step = end_end - end_own - step_own.T - torch.outer(mean_end, mean_end)
-    covariance = torch.cat([torch.cat([step_step, step_own], 1), torch.cat([step_own.T, own_own], 1)])
-    return torch.cat([mean_end, mean]), covariance
-
-
-class PartBranch(nn.Module):
-    """The paper's segmentation: each point's edge features beside the cloud's; one layer fewer than its three."""
-
-    def __init__(self, num_parts: int) -> None:
-        super().__init__()
-        self.head = PointHead(512, 2048, num_parts)
-
-    def forward(self, points: Tensor, encoding: Encoding) -> Tensor:
-        """(B, n, num_parts) logits of the first n points, those that are given."""
-        order, edges = encoding.inner
-        place = order.argsort(dim=1)[:, : points.shape[1]]
-        logits: Tensor = self.head(gather_rows(edges, place), encoding.features)
-        return logits
+        # LeakyReLU is monotone and follows the maximum.
+        return functional.leaky_relu(edge_max(features, indices, weight, bias), _SLOPE)
 
 
 class DGCNN(PointNetwork):
-    """DGCNN as in the authors' PyTorch code: no spatial transformer, LeakyReLU, maximum and mean pooling.
+    """DGCNN with four edge convolutions, maximum and mean pooling.
 
     Args:
         num_classes: number of logits.
-        k: neighbours per point, itself included; None takes as many as the authors: 20, and 40 from 2048 points on.
+        k: neighbours per point, the point itself included; None takes the authors' 20, and 40 from 2048 points on.
         batchnorm_eps: epsilon of every batch normalisation.
     """
 
@@ -121,19 +74,19 @@ class DGCNN(PointNetwork):
         set_batchnorm(self, eps=batchnorm_eps)
 
     def num_neighbours(self, num_points: int) -> int:
-        """How many neighbours each point has in a cloud of so many points."""
+        """Return the number of neighbours per point in a cloud of `num_points`."""
         return self.k or (20 if num_points < 2048 else 40)
 
     def neighbourhoods(self, points: Tensor) -> Neighbourhoods:
-        """(B, N) order in which near points follow each other, and (B, N, k) neighbours in that order."""
+        """Return the (B, N) spatial order of the points, and (B, N, k) neighbours in that order."""
         order = spatial_order(points)
         points = gather_rows(points, order)
         return order, knn(points, points, self.num_neighbours(points.shape[1]), in_order=True)
 
     def edge_features(self, points: Tensor, neighbours: Tensor) -> list[Tensor]:
-        """(B, N, 64), (B, N, 64), (B, N, 128) and (B, N, 256) outputs of the edge convolutions.
+        """Return the outputs of the four edge convolutions: (B, N, 64), (B, N, 64), (B, N, 128), (B, N, 256).
 
-        In full precision: the factored product subtracts what bfloat16 could no longer tell apart.
+        In full precision: the factored product subtracts numbers that bfloat16 could not tell apart.
 
         Args:
             points: (B, N, 3) in spatial order.
@@ -144,22 +97,40 @@ class DGCNN(PointNetwork):
         with full_precision(points):
             for conv in self.convs:
                 if outputs:
-                    neighbours = knn(features, features, neighbours.shape[2], in_order=True)
-                features = conv(features, neighbours)
+                    neighbours = knn(features, features, neighbours.shape[2], in_order=True)  # (B, N, k)
+                features = conv(features, neighbours)  # (B, N, C)
                 outputs.append(features)
         return outputs
+
+    def encode(self, points: Tensor, neighbourhoods: Neighbourhoods | None = None) -> Encoding:
+        """Encode (B, N, 3) points.
+
+        Intermediate: (B, N) spatial order, and (B, N, 512) outputs of the edge convolutions in that order.
+        """
+        order, neighbours = neighbourhoods or self.neighbourhoods(points)  # (B, N), (B, N, k)
+        edges = torch.cat(self.edge_features(gather_rows(points, order), neighbours), dim=-1)  # (B, N, 512)
+        linear, norm = cast(nn.Linear, self.aggregate[0]), cast(RowBatchNorm, self.aggregate[1])
+        rows = functional.leaky_relu_(norm.after_linear(linear, edges), _SLOPE)  # (B, N, 1024)
+        features = torch.cat([max_over_points(rows), rows.mean(dim=1)], dim=-1)  # (B, 2048)
+        return Encoding(features, (order, edges))
 
     def part_branch(self, num_parts: int) -> nn.Module:
         return PartBranch(num_parts)
 
-    def encode(self, points: Tensor, neighbourhoods: Neighbourhoods | None = None) -> Encoding:
-        """Features (B, 2048) are maximum and mean over the points.
 
-        Inner: (B, N) spatial order, (B, N, 512) outputs of the edge convolutions in that order.
-        """
-        order, neighbours = neighbourhoods or self.neighbourhoods(points)
-        edges = torch.cat(self.edge_features(gather_rows(points, order), neighbours), dim=-1)
-        linear, norm = cast(nn.Linear, self.aggregate[0]), cast(RowBatchNorm, self.aggregate[1])
-        rows = norm.after(linear, edges)  # (B, N, 1024)
-        rows = functional.leaky_relu_(rows, _SLOPE)
-        return Encoding(torch.cat([max_over_points(rows), rows.mean(dim=1)], dim=-1), (order, edges))
+class PartBranch(nn.Module):
+    """Segmentation of the paper: edge features of the points beside the features of the cloud.
+
+    Deviation: two hidden layers in place of three.
+    """
+
+    def __init__(self, num_parts: int) -> None:
+        super().__init__()
+        self.head = PointHead(512, 2048, num_parts)
+
+    def forward(self, points: Tensor, encoding: Encoding) -> Tensor:
+        """Return (B, n, num_parts) logits of the first n points of the encoded clouds."""
+        order, edges = encoding.intermediate
+        rank = order.argsort(dim=1)[:, : points.shape[1]]  # (B, n), place of each point in the spatial order
+        logits: Tensor = self.head(gather_rows(edges, rank), encoding.features)
+        return logits

@@ -10,8 +10,8 @@ from torch import Tensor, nn
 from doorstate.errors import unknown_name
 from doorstate.networks.base import Neighbourhoods, PointNetwork
 from doorstate.networks.heads import HEADS, POINT_HEADS, STATE, HeadSpec
-from doorstate.networks.kernels.ops import at_least_float32, full_precision
-from doorstate.networks.layers import Dense, glorot
+from doorstate.networks.kernels.precision import at_least_float32, full_precision
+from doorstate.networks.layers.dense import Dense, glorot
 
 Targets = Mapping[str, Tensor]
 """By name of the head: (B, num_values) float targets, NaN where unknown; or (B, n) int64 classes of points."""
@@ -77,7 +77,7 @@ def head_outputs(
     Raises:
         CloudContentError: as there.
     """
-    network.check(points)
+    network.check_points(points)
     encoding = network.encode(points, neighbourhoods)
     outputs = {STATE: at_least_float32(network.head(encoding.features))}
     for name, head in network.heads.items():
@@ -112,9 +112,9 @@ def joint_losses(
         Scalar losses by name of the head, "state" among them, each the mean over the clouds with a target; and
         (B, num_classes) logits of the states.
     """
-    network.check(points)
+    network.check_points(points)
     encoding = network.encode(points, neighbourhoods)
-    loss, logits = network.loss_of(encoding, labels, label_smoothing)
+    loss, logits = network.loss_from_encoding(encoding, labels, label_smoothing)
     # The mean over no doors would be NaN.
     losses = {STATE: loss if (labels >= 0).any() else logits.sum() * 0}
     for name, head in network.heads.items():

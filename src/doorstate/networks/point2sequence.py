@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Point2Sequence: growing areas around a point, read as a sequence with attention.
 
-Liu et al., 2019, arXiv:1811.02565.
+Liu et al., 2019, arXiv:1811.02565, figure 2.
 """
 
 from __future__ import annotations
@@ -10,25 +10,22 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from doorstate.errors import ConfigError
+from doorstate.errors import unknown_name
 from doorstate.networks.base import Encoding, Neighbourhoods, PointNetwork
-from doorstate.networks.kernels.ops import gather_rows
-from doorstate.networks.kernels.search import knn
-from doorstate.networks.layers import (
-    Dense,
-    PooledMLP,
-    RowBatchNorm,
-    classification_head,
-    glorot,
-    set_batchnorm,
-)
+from doorstate.networks.kernels.gather import gather_rows
+from doorstate.networks.kernels.knn import knn
+from doorstate.networks.layers.batch_norm import RowBatchNorm, set_batchnorm
+from doorstate.networks.layers.dense import Dense, classification_head, glorot
+from doorstate.networks.layers.point_mlp import PooledMLP
 
 NUM_CENTRES = 384
 WIDTH = 128
 AREAS = {16: (32, 64, WIDTH), 32: (64, 64, WIDTH), 64: (64, 64, WIDTH), 128: (128, 128, WIDTH)}
 """Layer widths by the number of points of an area."""
+REGION_FEATURES = ("attention", "released")
 
 State = tuple[Tensor, Tensor]
+"""Hidden and cell state, (..., hidden) each."""
 
 
 class LSTMCell(nn.Module):
@@ -39,18 +36,20 @@ class LSTMCell(nn.Module):
         self.linear = glorot(nn.Linear(in_channels + hidden, 4 * hidden))
 
     def forward(self, inputs: Tensor, state: State | None = None) -> State:
-        """Hidden and cell state (..., hidden) after one step.
+        """Return the state after one step.
 
-        Without a state, hidden and cell state are zero; so are input channels left out at the end.
+        Args:
+            inputs: (..., C) first channels of the input; the remaining channels are zero.
+            state: state before; zero if None.
         """
         rows = inputs if state is None else torch.cat([inputs, state[0]], dim=-1)
-        # Zeros meet the last columns of the weight: leave both out.
+        # Zeros meet the last columns of the weight: both are left out.
         gates = functional.linear(rows, self.linear.weight[:, : rows.shape[-1]], self.linear.bias)
-        enter, forget, candidate, leave = gates.chunk(4, dim=-1)
-        cell = torch.sigmoid(enter) * torch.tanh(candidate)
+        input_gate, forget_gate, candidate, output_gate = gates.chunk(4, dim=-1)
+        cell = torch.sigmoid(input_gate) * torch.tanh(candidate)
         if state is not None:
-            cell = cell + torch.sigmoid(forget + 1) * state[1]
-        return torch.sigmoid(leave) * torch.tanh(cell), cell
+            cell = cell + torch.sigmoid(forget_gate + 1) * state[1]
+        return torch.sigmoid(output_gate) * torch.tanh(cell), cell
 
 
 class Attention(nn.Module):
@@ -64,13 +63,13 @@ class Attention(nn.Module):
         self.combine = glorot(nn.Linear(2 * width, width, bias=False))
 
     def weights(self, memory: Tensor, query: Tensor) -> Tensor:
-        """(..., T) weights, which sum to one, of a (..., T, W) memory for a (..., W) query."""
+        """Return the (..., T) weights, which sum to one, of a (..., T, W) memory for a (..., W) query."""
         scores: Tensor = self.score(torch.tanh(self.memory(memory) + self.query(query).unsqueeze(-2)))
         return torch.softmax(scores.squeeze(-1), dim=-1)
 
     def forward(self, memory: Tensor, query: Tensor) -> Tensor:
-        """(..., W) attention vector, a linear map of the query and the weighted memory."""
-        context = (self.weights(memory, query).unsqueeze(-1) * memory).sum(dim=-2)
+        """Return the (..., W) attention vector, a linear map of the query and the weighted memory."""
+        context = (self.weights(memory, query).unsqueeze(-1) * memory).sum(dim=-2)  # (..., W)
         vector: Tensor = self.combine(torch.cat([query, context], dim=-1))
         return vector
 
@@ -80,13 +79,13 @@ class Point2Sequence(PointNetwork):
 
     Args:
         num_classes: number of logits.
-        region_feature: "attention", the attention vector; "released", the decoder's hidden state, as in the
+        region_feature: "attention" takes the attention vector; "released" the decoder's hidden state, as in the
             authors' code, where attention never reaches the output.
         dilation: every how many of the nearest points belong to an area.
         batchnorm_eps: epsilon of every batch normalisation; 1e-3 in the original.
 
     Raises:
-        ConfigError: Unknown region feature.
+        ConfigError: unknown region feature.
     """
 
     feature_size = 1024
@@ -100,10 +99,8 @@ class Point2Sequence(PointNetwork):
         batchnorm_eps: float = 1e-5,
     ) -> None:
         super().__init__()
-        if region_feature not in ("attention", "released"):
-            raise ConfigError(
-                f"point2sequence has no region feature {region_feature!r}: use attention or released"
-            )
+        if region_feature not in REGION_FEATURES:
+            raise unknown_name("point2sequence region_feature", region_feature, REGION_FEATURES)
         self.region_feature = region_feature
         self.dilation = dilation
         self.num_centres = NUM_CENTRES
@@ -120,21 +117,21 @@ class Point2Sequence(PointNetwork):
         self.num_centres = max(1, round(share * NUM_CENTRES))
 
     def neighbourhoods(self, points: Tensor) -> Neighbourhoods:
-        """One (B, M, 128): sorted neighbours of the centres; the areas are its first 16, 32, 64 and 128."""
+        """Return one (B, M, 128): sorted neighbours of the centres, of which the areas are the first 16 to 128."""
         largest = max(AREAS)
         # Deviation: with fewer than 128 * dilation points the dilation shrinks.
         dilation = min(self.dilation, points.shape[1] // largest)
         return (knn(points[:, : self.num_centres], points, largest * dilation)[..., ::dilation],)
 
     def sequence(self, points: Tensor, neighbours: Tensor) -> Tensor:
-        """(B, M, 4, 128) features of the areas, smallest first; neighbours are (B, M, 128)."""
+        """Return the (B, M, 4, 128) features of the areas, smallest first; neighbours are (B, M, 128)."""
         offsets = gather_rows(points, neighbours)  # (B, M, 128, 3)
         offsets = offsets - points[:, : self.num_centres].unsqueeze(2)
-        areas = [mlp(offsets[:, :, :size]) for size, mlp in zip(AREAS, self.mlps, strict=True)]
+        areas = [mlp(offsets[:, :, :size]) for size, mlp in zip(AREAS, self.mlps, strict=True)]  # (B, M, 128)
         return torch.stack(areas, dim=2)
 
-    def regions(self, sequence: Tensor) -> tuple[Tensor, Tensor]:
-        """Encoder states (B, M, 4, 128) and the decoder's hidden state (B, M, 128) of a sequence."""
+    def encode_decode(self, sequence: Tensor) -> tuple[Tensor, Tensor]:
+        """Return the encoder states (B, M, 4, 128) and the decoder's hidden state (B, M, 128) of a sequence."""
         state: State | None = None
         memory = []
         for step in sequence.unbind(dim=2):
@@ -144,8 +141,13 @@ class Point2Sequence(PointNetwork):
         return torch.stack(memory, dim=2), hidden
 
     def encode(self, points: Tensor, neighbourhoods: Neighbourhoods | None = None) -> Encoding:
-        """Features (B, 1024) are the maximum over the centres, whose coordinates enter absolutely."""
-        (neighbours,) = neighbourhoods or self.neighbourhoods(points)
-        region, query = self.regions(self.sequence(points, neighbours))
-        region = self.attention(region, query) if self.region_feature == "attention" else query
-        return Encoding(self.globals(points[:, : self.num_centres], self.region(region)))
+        """Encode (B, N, 3) points; the last level sees absolute coordinates of the centres."""
+        (neighbours,) = neighbourhoods or self.neighbourhoods(points)  # (B, M, 128)
+        areas = self.sequence(points, neighbours)  # (B, M, 4, 128)
+        memory, hidden = self.encode_decode(areas)  # (B, M, 4, 128), (B, M, 128)
+        region = self.attention(memory, hidden) if self.region_feature == "attention" else hidden
+        region = self.region(region)  # (B, M, 128)
+        features = self.globals(
+            points[:, : self.num_centres], region
+        )  # (B, 1024), the maximum over the centres
+        return Encoding(features)

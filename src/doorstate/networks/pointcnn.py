@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""PointCNN: convolution after a learned reordering of each neighbourhood (Li et al., 2018, arXiv:1801.07791).
+"""PointCNN: convolution after a learned reordering of each neighbourhood.
 
-Every layer is linear, then ELU, then batch normalisation, without bias except the logits'.
+Li et al., 2018, arXiv:1801.07791, algorithm 1 and the authors' `modelnet_x3_l4`. Every layer is linear, then ELU, then
+batch normalisation, without bias except the logits'.
 """
 
 from __future__ import annotations
@@ -14,13 +15,16 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from doorstate.networks.base import Encoding, Neighbourhoods, PointNetwork
-from doorstate.networks.kernels.ops import at_least_float32, full_precision, gather_rows, weigh_neighbours
-from doorstate.networks.kernels.search import knn
-from doorstate.networks.layers import PointLinear, RowBatchNorm, set_batchnorm
+from doorstate.networks.kernels.gather import gather_rows
+from doorstate.networks.kernels.knn import knn
+from doorstate.networks.kernels.precision import at_least_float32, full_precision
+from doorstate.networks.kernels.separable import separable
+from doorstate.networks.layers.batch_norm import RowBatchNorm, set_batchnorm
+from doorstate.networks.layers.point_mlp import PointLinear
 
 
 class Level(NamedTuple):
-    """One X-Conv of the network."""
+    """Settings of one X-Conv."""
 
     k: int
     dilation: int
@@ -28,46 +32,13 @@ class Level(NamedTuple):
     channels: int
 
 
-# K and channels of the original's table `modelnet_x3_l4`; its D and P are the defaults of `PointCNN`.
-_LEVELS = ((8, 48), (12, 96), (16, 192), (16, 384))
-_MOST_VALUES_AT_ONCE = (
-    2048  # of one neighbourhood; the first three levels have 192, 720 and 1920, the last 3840
-)
-
-
-def _elu_dense(linear: nn.Linear) -> nn.Sequential:
-    nn.init.xavier_normal_(linear.weight)
-    return nn.Sequential(linear, nn.ELU(), RowBatchNorm(linear.out_features))
-
-
-def _depthwise(rows: Tensor, weight: Tensor) -> Tensor:
-    """Contract one axis of each matrix: (B, P, K, C) with weight (K, C, m) to (B, P, C, m)."""
-    return torch.einsum("bpkc,kcm->bpcm", rows, weight)
-
-
-def _depthwise_weight(k: int, channels: int, multiplier: int) -> nn.Parameter:
-    std = sqrt(2 / (k * channels + k * multiplier))  # Glorot-normal, fans counted as TensorFlow does
-    return nn.Parameter(torch.randn(k, channels, multiplier) * std)
-
-
-def _separable(rows: Tensor, depthwise: Tensor, pointwise: nn.Linear) -> Tensor:
-    """Weigh the neighbours of each channel, then mix the channels: (B, P, K, C) to (B, P, C_out).
-
-    Nothing comes between the two, so few channels take both in one product; with many that is more arithmetic
-    than the passes over memory that it saves.
-    """
-    k, channels, multiplier = depthwise.shape
-    mixing = pointwise.weight.view(-1, channels, multiplier)
-    if k * channels <= _MOST_VALUES_AT_ONCE:
-        with full_precision(rows):
-            weight = torch.einsum("kcm,ocm->okc", depthwise, mixing)
-        return functional.linear(rows.flatten(2), weight.flatten(1))
-    weighed = weigh_neighbours(rows, depthwise)  # (B, P, m, C)
-    return functional.linear(weighed.flatten(2), mixing.transpose(1, 2).flatten(1))
+_LEVELS = ((8, 48), (12, 96), (16, 192), (16, 384))  # K and channels of the original
+_DEFAULT_DILATIONS = (1, 2, 2, 3)
+_DEFAULT_REPRESENTATIVES = (None, 384, 128, 128)
 
 
 class XTransform(nn.Module):
-    """Predicts the X matrix of each neighbourhood from its coordinates."""
+    """Prediction of the X matrix of each neighbourhood from its coordinates."""
 
     def __init__(self, k: int) -> None:
         super().__init__()
@@ -79,11 +50,11 @@ class XTransform(nn.Module):
         self.norm0, self.norm1, self.norm2 = (RowBatchNorm(k * k) for _ in range(3))
 
     def forward(self, offsets: Tensor) -> Tensor:
-        """(B, P, K, K) matrices of (B, P, K, 3) coordinates relative to the representative point."""
+        """Return (B, P, K, K) matrices of (B, P, K, 3) coordinates relative to the representative point."""
         square = (*offsets.shape[:2], self.k, self.k)
         with full_precision(offsets):
             x = self.linear(offsets.flatten(2))  # (B, P, K * K)
-        x = self.norm0(functional.elu(x)).view(square)
+        x = self.norm0(functional.elu(x)).view(square)  # (B, P, K, K)
         # A depthwise step contracts one axis and puts a new one last: the two contract different axes.
         x = self.norm1(functional.elu(_depthwise(x, self.depthwise1).flatten(2))).view(square)
         matrices: Tensor = self.norm2(_depthwise(x, self.depthwise2).flatten(2)).view(square)
@@ -91,7 +62,7 @@ class XTransform(nn.Module):
 
 
 class XConv(nn.Module):
-    """X-Conv operator: from points with features to representative points with features."""
+    """X-Conv operator (algorithm 1): from points with features to representative points with features."""
 
     def __init__(self, level: Level, num_features: int, with_global: bool = False) -> None:
         super().__init__()
@@ -116,14 +87,14 @@ class XConv(nn.Module):
             self.out_channels += quarter
 
     def neighbours(self, points: Tensor) -> Tensor:
-        """(B, P, K) every D-th of the nearest points of each representative, itself first."""
+        """Return (B, P, K): every D-th of the nearest points of each representative, itself first."""
         # Deviation: with fewer than K * D points the dilation shrinks, so that K neighbours remain.
         dilation = min(self.dilation, points.shape[1] // self.k)
         representatives = points[:, : self.num_representatives]
         return knn(representatives, points, self.k * dilation)[..., ::dilation]
 
     def forward(self, points: Tensor, features: Tensor | None, indices: Tensor) -> tuple[Tensor, Tensor]:
-        """Representatives (B, P, 3) and their features (B, P, out_channels).
+        """Return the representatives (B, P, 3) and their features (B, P, out_channels).
 
         Args:
             points: (B, N, 3).
@@ -131,24 +102,25 @@ class XConv(nn.Module):
             indices: (B, P, K) as `neighbours` returns them.
         """
         # Deviation: the first points in farthest-point order, not the first of a random permutation.
-        representatives = points[:, : self.num_representatives]
+        representatives = points[:, : self.num_representatives]  # (B, P, 3)
         offsets = gather_rows(points, indices) - representatives.unsqueeze(2)  # (B, P, K, 3)
         rows = self.lift(offsets)  # (B, P, K, C_lift)
         if features is not None:
             rows = torch.cat([rows, gather_rows(features, indices)], dim=-1)  # (B, P, K, C_lift + F)
-        rows = self.transform(offsets) @ rows
+        rows = self.transform(offsets) @ rows  # (B, P, K, C_lift + F)
         linear, activation, norm = self.pointwise
-        out = norm(activation(_separable(rows, self.depthwise, cast(nn.Linear, linear))))  # (B, P, channels)
+        out = separable(rows, self.depthwise, cast(nn.Linear, linear).weight)  # (B, P, channels)
+        out = norm(activation(out))
         if self.position is not None:
-            out = torch.cat([self.position(representatives), out], dim=-1)
+            out = torch.cat([self.position(representatives), out], dim=-1)  # (B, P, channels / 4 + channels)
         return representatives, out
 
 
 class PointCNN(PointNetwork):
     """PointCNN `x3_l4` on coordinates.
 
-    The representative points of the last level are classified one by one while training; their features are
-    averaged for one answer per cloud.
+    The representative points of the last level are classified one by one in training; their features are averaged for
+    one result per cloud.
 
     Args:
         num_classes: number of logits.
@@ -163,8 +135,8 @@ class PointCNN(PointNetwork):
         self,
         num_classes: int = 3,
         *,
-        dilations: tuple[int, int, int, int] = (1, 2, 2, 3),
-        num_representatives: tuple[int | None, int | None, int | None, int | None] = (None, 384, 128, 128),
+        dilations: tuple[int, int, int, int] = _DEFAULT_DILATIONS,
+        num_representatives: tuple[int | None, int | None, int | None, int | None] = _DEFAULT_REPRESENTATIVES,
         batchnorm_eps: float = 1e-5,
     ) -> None:
         super().__init__()
@@ -185,38 +157,60 @@ class PointCNN(PointNetwork):
         set_batchnorm(self, eps=batchnorm_eps)
 
     def use_centres(self, share: float) -> None:
-        for level in self.levels:
-            if isinstance(level, XConv) and level.all_representatives is not None:
+        for level in self._convs():
+            if level.all_representatives is not None:
                 level.num_representatives = max(level.k, round(share * level.all_representatives))
 
     def neighbourhoods(self, points: Tensor) -> Neighbourhoods:
-        """(B, P, K) neighbours of the representative points of each level."""
-        found = []
-        for level in self.levels:
-            assert isinstance(level, XConv)
-            found.append(level.neighbours(points))
+        """Return the (B, P, K) neighbours of the representative points of each level."""
+        neighbours = []
+        for level in self._convs():
+            neighbours.append(level.neighbours(points))
             points = points[:, : level.num_representatives]
-        return tuple(found)
+        return tuple(neighbours)
 
     def point_features(self, points: Tensor, neighbourhoods: Neighbourhoods | None = None) -> Tensor:
-        """(B, P, 192) features of the representative points of the last level."""
+        """Return the (B, P, 192) features of the representative points of the last level."""
         features = None
-        known = neighbourhoods or self.neighbourhoods(points)
-        for level, indices in zip(self.levels, known, strict=True):
+        neighbours = neighbourhoods or self.neighbourhoods(points)
+        for level, indices in zip(self.levels, neighbours, strict=True):
+            # (B, N, 48), (B, 384, 96), (B, 128, 192), (B, 128, 480)
             points, features = level(points, features, indices)
-        rows: Tensor = self.dense(features)
+        rows: Tensor = self.dense(features)  # (B, 128, 192)
         return rows
 
     def encode(self, points: Tensor, neighbourhoods: Neighbourhoods | None = None) -> Encoding:
-        """Features (B, 192) are the mean of `point_features`, which are the inner ones."""
-        rows = self.point_features(points, neighbourhoods)
-        return Encoding(at_least_float32(rows).mean(dim=1), (rows,))
+        """Encode (B, N, 3) points; intermediate: `point_features`, of which the features are the mean."""
+        rows = self.point_features(points, neighbourhoods)  # (B, P, 192)
+        features = at_least_float32(rows).mean(dim=1)  # (B, 192)
+        return Encoding(features, (rows,))
 
-    def loss_of(self, encoding: Encoding, labels: Tensor, label_smoothing: float) -> tuple[Tensor, Tensor]:
+    def loss_from_encoding(
+        self, encoding: Encoding, labels: Tensor, label_smoothing: float
+    ) -> tuple[Tensor, Tensor]:
         """Mean cross entropy of all representative points; the logits returned are their mean."""
-        logits = at_least_float32(self.head(encoding.inner[0]))  # (B, P, C)
+        (rows,) = encoding.intermediate
+        logits = at_least_float32(self.head(rows))  # (B, P, C)
         tiled = labels.unsqueeze(1).expand(logits.shape[:2])  # (B, P)
         loss = functional.cross_entropy(
             logits.flatten(0, 1), tiled.flatten(), label_smoothing=label_smoothing
         )
         return loss, logits.mean(dim=1)
+
+    def _convs(self) -> list[XConv]:
+        return [cast(XConv, level) for level in self.levels]
+
+
+def _elu_dense(linear: nn.Linear) -> nn.Sequential:
+    nn.init.xavier_normal_(linear.weight)
+    return nn.Sequential(linear, nn.ELU(), RowBatchNorm(linear.out_features))
+
+
+def _depthwise(rows: Tensor, weight: Tensor) -> Tensor:
+    """Contract one axis of each matrix: (B, P, K, C) with weight (K, C, m) to (B, P, C, m)."""
+    return torch.einsum("bpkc,kcm->bpcm", rows, weight)
+
+
+def _depthwise_weight(k: int, channels: int, multiplier: int) -> nn.Parameter:
+    std = sqrt(2 / (k * channels + k * multiplier))  # Glorot-normal, fans counted as TensorFlow does
+    return nn.Parameter(torch.randn(k, channels, multiplier) * std)

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""PointNet: shared dense layers, two learned alignments, one maximum (Qi et al., 2017, arXiv:1612.00593)."""
+"""PointNet: shared dense layers, two learned alignments, one maximum.
+
+Qi et al., 2017, arXiv:1612.00593, figure 2.
+"""
 
 from __future__ import annotations
 
@@ -7,19 +10,14 @@ import torch
 from torch import Tensor, nn
 
 from doorstate.networks.base import Encoding, Neighbourhoods, PointNetwork
-from doorstate.networks.kernels.ops import at_least_float32, full_precision
-from doorstate.networks.layers import (
-    Dense,
-    DenseMax,
-    PointHead,
-    PointMLP,
-    classification_head,
-    set_batchnorm,
-)
+from doorstate.networks.kernels.precision import at_least_float32, full_precision
+from doorstate.networks.layers.batch_norm import set_batchnorm
+from doorstate.networks.layers.dense import Dense, PointHead, classification_head
+from doorstate.networks.layers.point_mlp import DenseMax, PointMLP
 
 
 class TransformNet(nn.Module):
-    """T-Net: predicts a square matrix for a whole cloud, exactly the identity before training."""
+    """T-Net: a small PointNet that predicts a square matrix per cloud; the identity before training."""
 
     def __init__(self, size: int) -> None:
         super().__init__()
@@ -32,25 +30,14 @@ class TransformNet(nn.Module):
         nn.init.zeros_(self.output.bias)
 
     def forward(self, rows: Tensor) -> Tensor:
-        """(B, size, size) transform, full precision, of (B, N, size) rows."""
-        code = at_least_float32(self.dense(self.pool(self.trunk(rows))))  # (B, 256)
+        """Return the (B, size, size) transform, in full precision, of (B, N, size) rows."""
+        rows = self.trunk(rows)  # (B, N, 128)
+        code = self.pool(rows)  # (B, 1024)
+        code = at_least_float32(self.dense(code))  # (B, 256)
         with full_precision(code):
-            residual = self.output(code).view(-1, self.size, self.size)
+            residual = self.output(code).view(-1, self.size, self.size)  # (B, size, size)
         transform: Tensor = residual + torch.eye(self.size, dtype=residual.dtype, device=residual.device)
         return transform
-
-
-class PartBranch(nn.Module):
-    """The paper's segmentation: each point's row beside the cloud's features; narrower than its 512, 256, 128."""
-
-    def __init__(self, num_parts: int) -> None:
-        super().__init__()
-        self.head = PointHead(64, 1024, num_parts)
-
-    def forward(self, points: Tensor, encoding: Encoding) -> Tensor:
-        """(B, n, num_parts) logits of the first n points, those that are given."""
-        logits: Tensor = self.head(encoding.inner[1][:, : points.shape[1]], encoding.features)
-        return logits
 
 
 class PointNet(PointNetwork):
@@ -77,30 +64,51 @@ class PointNet(PointNetwork):
         self.head = classification_head(self.feature_size, num_classes, dropout=0.3)
         set_batchnorm(self, eps=batchnorm_eps)
 
-    def part_branch(self, num_parts: int) -> nn.Module:
-        return PartBranch(num_parts)
-
     def encode(self, points: Tensor, neighbourhoods: Neighbourhoods | None = None) -> Encoding:
-        """Features (B, 1024) are the maximum over the points; inner: (B, 64, 64) feature transform, (B, N, 64) rows."""
+        """Encode (B, N, 3) points; intermediate: (B, 64, 64) feature transform and (B, N, 64) rows."""
         rotation = self.input_transform(points)  # (B, 3, 3)
         with full_precision(points):
             aligned = points @ rotation  # (B, N, 3)
         rows = self.local(aligned)  # (B, N, 64)
         transform = self.feature_transform(rows)  # (B, 64, 64)
-        rows = rows @ transform
-        return Encoding(self.encoder(rows), (transform, rows))
+        rows = rows @ transform  # (B, N, 64)
+        features = self.encoder(rows)  # (B, 1024), the maximum over the points
+        return Encoding(features, (transform, rows))
 
-    def loss_of(self, encoding: Encoding, labels: Tensor, label_smoothing: float) -> tuple[Tensor, Tensor]:
+    def loss_from_encoding(
+        self, encoding: Encoding, labels: Tensor, label_smoothing: float
+    ) -> tuple[Tensor, Tensor]:
         """Cross entropy + weight/2 * sum over the batch of |A A^T - I|_F^2, A the feature transform.
 
         A sum, not a mean, as TensorFlow's l2_loss in the original: its weight grows with the batch.
         """
-        loss, logits = super().loss_of(encoding, labels, label_smoothing)
-        return loss + self.regularizer_weight * orthogonality_penalty(encoding.inner[0]), logits
+        loss, logits = super().loss_from_encoding(encoding, labels, label_smoothing)
+        transform, _ = encoding.intermediate
+        return loss + self.regularizer_weight * orthogonality_penalty(transform), logits
+
+    def part_branch(self, num_parts: int) -> nn.Module:
+        return PartBranch(num_parts)
 
 
 def orthogonality_penalty(transform: Tensor) -> Tensor:
-    """Half the sum over the batch of |A A^T - I|_F^2 of (B, K, K) matrices, in full precision."""
+    """Return half the sum over the batch of |A A^T - I|_F^2 of (B, K, K) matrices, in full precision."""
     with full_precision(transform):
         identity = torch.eye(transform.shape[-1], dtype=transform.dtype, device=transform.device)
         return 0.5 * (transform @ transform.mT - identity).square().sum()
+
+
+class PartBranch(nn.Module):
+    """Segmentation of the paper: rows of the points beside the features of the cloud.
+
+    Deviation: 256 and 128 channels in place of 512, 256 and 128.
+    """
+
+    def __init__(self, num_parts: int) -> None:
+        super().__init__()
+        self.head = PointHead(64, 1024, num_parts)
+
+    def forward(self, points: Tensor, encoding: Encoding) -> Tensor:
+        """Return (B, n, num_parts) logits of the first n points of the encoded clouds."""
+        _, rows = encoding.intermediate
+        logits: Tensor = self.head(rows[:, : points.shape[1]], encoding.features)
+        return logits

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""PointNet++: small PointNets on balls around ever fewer centres (Qi et al., 2017, arXiv:1706.02413)."""
+"""PointNet++: small PointNets on balls around ever fewer centres.
+
+Qi et al., 2017, arXiv:1706.02413, figure 2.
+"""
 
 from __future__ import annotations
 
@@ -9,30 +12,27 @@ from typing import NamedTuple
 import torch
 from torch import Tensor, nn
 
-from doorstate.errors import ConfigError
+from doorstate.errors import unknown_name
 from doorstate.networks.base import Encoding, Neighbourhoods, PointNetwork
-from doorstate.networks.kernels.ops import full_precision, gather_rows
-from doorstate.networks.kernels.search import ball_query, knn
-from doorstate.networks.layers import (
-    Dense,
-    PooledMLP,
-    RowBatchNorm,
-    classification_head,
-    glorot,
-    set_batchnorm,
-)
+from doorstate.networks.kernels.ball_query import ball_query
+from doorstate.networks.kernels.gather import gather_rows
+from doorstate.networks.kernels.knn import knn
+from doorstate.networks.kernels.precision import full_precision
+from doorstate.networks.layers.batch_norm import RowBatchNorm, set_batchnorm
+from doorstate.networks.layers.dense import Dense, classification_head, glorot
+from doorstate.networks.layers.point_mlp import PooledMLP
 
 
 class Scale(NamedTuple):
-    """One ball size of a level: its radius relative to the level's, slots for points, layer widths."""
+    """Ball size of a level."""
 
-    relative_radius: float
-    num_samples: int
-    channels: tuple[int, ...]
+    relative_radius: float  # to the radius of the level
+    num_samples: int  # points per ball
+    channels: tuple[int, ...]  # of the shared layers
 
 
 class Variant(NamedTuple):
-    """The two levels before everything is grouped, and the dropout rate of the head."""
+    """The two levels with balls, and the dropout rate of the head."""
 
     levels: tuple[tuple[Scale, ...], tuple[Scale, ...]]
     dropout: float
@@ -51,7 +51,7 @@ VARIANTS = {
 
 
 class SetAbstraction(nn.Module):
-    """Centres with the pooled features of the balls around them, one ball per scale.
+    """Level of the network: centres, and a PointNet on the ball around each, one ball per scale.
 
     Args:
         num_centres: the first points of the cloud serve as centres, all points if there are fewer.
@@ -67,64 +67,20 @@ class SetAbstraction(nn.Module):
         self.mlps = nn.ModuleList([PooledMLP(num_features, scale.channels) for scale in scales])
         self.out_channels = sum(scale.channels[-1] for scale in scales)
 
-    def neighbourhoods(self, points: Tensor) -> tuple[Tensor, ...]:
-        """(B, M, K) points in the balls around the centres, one per scale."""
+    def neighbourhoods(self, points: Tensor) -> Neighbourhoods:
+        """Return the (B, M, K) points in the balls around the centres, one tensor per scale."""
         return tuple(ball_query(points[:, : self.num_centres], points, *ball) for ball in self.balls)
 
     def forward(
         self, points: Tensor, features: Tensor | None, neighbourhoods: Neighbourhoods
     ) -> tuple[Tensor, Tensor]:
-        """(B, M, 3) centres and (B, M, out_channels) features of (B, N, 3) points and (B, N, F) features."""
-        centres = points[:, : self.num_centres]
+        """Return (B, M, 3) centres and (B, M, out_channels) features of (B, N, 3) points and (B, N, F) features."""
+        centres = points[:, : self.num_centres]  # (B, M, 3)
         pooled = []
         for indices, mlp in zip(neighbourhoods, self.mlps, strict=True):
             offsets = gather_rows(points, indices) - centres.unsqueeze(2)  # (B, M, K, 3)
-            pooled.append(mlp(offsets, features, indices))
+            pooled.append(mlp(offsets, features, indices))  # (B, M, C)
         return centres, torch.cat(pooled, dim=-1)
-
-
-class PartBranch(nn.Module):
-    """The paper's segmentation: features travel back to the centres, and from them to the points near each.
-
-    Three nearest centres, weighed by inverse squared distance. A linear layer commutes with that mean, so it is applied
-    to the few centres before.
-    """
-
-    def __init__(self, num_parts: int, first: int, second: int) -> None:
-        super().__init__()
-        self.second = nn.Sequential(Dense(second + 1024, 256), glorot(nn.Linear(256, 256)))
-        self.first = glorot(nn.Linear(first, 256))
-        self.first_norm = RowBatchNorm(256)
-        self.between = glorot(nn.Linear(256, 128))
-        self.norm = RowBatchNorm(128)
-        self.rest = nn.Sequential(nn.ReLU(), Dense(128, 128), glorot(nn.Linear(128, num_parts)))
-
-    def forward(self, points: Tensor, encoding: Encoding) -> Tensor:
-        """(B, n, num_parts) logits of the first n points, those that are given."""
-        near, first, second = encoding.inner
-        far = near[:, : second.shape[1]]
-        cloud = encoding.features.unsqueeze(1).expand(-1, second.shape[1], -1)
-        rows = self.first(first) + interpolate(self.second(torch.cat([second, cloud], dim=-1)), far, near)
-        rows = self.between(self.first_norm(rows).relu())
-        logits: Tensor = self.rest(self.norm(interpolate(rows, near, points)))
-        return logits
-
-
-def interpolate(features: Tensor, centres: Tensor, points: Tensor) -> Tensor:
-    """(B, N, C) mean of the features of the three centres nearest to each point, weighed by 1 / distance^2.
-
-    Args:
-        features: (B, M, C) of the centres.
-        centres: (B, M, 3).
-        points: (B, N, 3).
-    """
-    nearest = knn(points, centres, 3)  # (B, N, 3)
-    with full_precision(points):
-        squares = (gather_rows(centres, nearest) - points.unsqueeze(2)).square().sum(dim=-1)
-        weight = 1 / (squares + 1e-8)
-        weight = weight / weight.sum(dim=-1, keepdim=True)
-    mean: Tensor = (gather_rows(features, nearest) * weight.unsqueeze(-1).to(features.dtype)).sum(dim=2)
-    return mean
 
 
 class PointNet2(PointNetwork):
@@ -138,12 +94,12 @@ class PointNet2(PointNetwork):
         batchnorm_eps: epsilon of every batch normalisation; 1e-3 in the original.
 
     Raises:
-        ConfigError: Unknown variant.
+        ConfigError: unknown variant.
     """
 
     feature_size = 1024
     has_point_features = True
-    neighbours_keep_under_scale = False  # a ball keeps its radius
+    neighbours_are_scale_invariant = False  # a ball keeps its radius
 
     def __init__(
         self,
@@ -156,7 +112,7 @@ class PointNet2(PointNetwork):
     ) -> None:
         super().__init__()
         if variant not in VARIANTS:
-            raise ConfigError(f"pointnet2 has no variant {variant!r}: use one of {', '.join(VARIANTS)}")
+            raise unknown_name("pointnet2 variant", variant, VARIANTS)
         levels, dropout = VARIANTS[variant]
         first, second = (
             [scale._replace(num_samples=num_samples or scale.num_samples) for scale in level]
@@ -173,21 +129,69 @@ class PointNet2(PointNetwork):
             level.num_centres = max(1, round(share * level.all_centres))
 
     def neighbourhoods(self, points: Tensor) -> Neighbourhoods:
-        """Balls of the first level's scales, then of the second's."""
-        return self.level1.neighbourhoods(points) + self.level2.neighbourhoods(
-            points[:, : self.level1.num_centres]
-        )
+        """Return the balls of the first level's scales, then of the second's."""
+        centres = points[:, : self.level1.num_centres]
+        return self.level1.neighbourhoods(points) + self.level2.neighbourhoods(centres)
+
+    def encode(self, points: Tensor, neighbourhoods: Neighbourhoods | None = None) -> Encoding:
+        """Encode (B, N, 3) points; the third level sees absolute coordinates.
+
+        Intermediate: (B, 512, 3) centres of the first level, (B, 512, C1) and (B, 128, C2) features of both levels.
+        """
+        balls = neighbourhoods or self.neighbourhoods(points)
+        scales = len(self.level1.balls)
+        centres1, features1 = self.level1(points, None, balls[:scales])  # (B, 512, 3), (B, 512, C1)
+        centres2, features2 = self.level2(centres1, features1, balls[scales:])  # (B, 128, 3), (B, 128, C2)
+        features = self.level3(centres2, features2)  # (B, 1024), the maximum over the centres
+        return Encoding(features, (centres1, features1, features2))
 
     def part_branch(self, num_parts: int) -> nn.Module:
         return PartBranch(num_parts, self.level1.out_channels, self.level2.out_channels)
 
-    def encode(self, points: Tensor, neighbourhoods: Neighbourhoods | None = None) -> Encoding:
-        """Features (B, 1024) are the maximum over the centres of the second level, whose coordinates enter absolutely.
 
-        Inner: (B, M, 3) centres of the first level, and (B, M, C) features of the centres of both levels.
-        """
-        balls = neighbourhoods or self.neighbourhoods(points)
-        scales = len(self.level1.balls)
-        near, first = self.level1(points, None, balls[:scales])
-        far, second = self.level2(near, first, balls[scales:])
-        return Encoding(self.level3(far, second), (near, first, second))
+class PartBranch(nn.Module):
+    """Segmentation of the paper: features are interpolated from centres to points, level by level.
+
+    A linear layer commutes with the weighted mean of three centres, so it is applied before, to fewer rows.
+    """
+
+    def __init__(self, num_parts: int, channels1: int, channels2: int) -> None:
+        super().__init__()
+        self.second = nn.Sequential(Dense(channels2 + 1024, 256), glorot(nn.Linear(256, 256)))
+        self.first = glorot(nn.Linear(channels1, 256))
+        self.first_norm = RowBatchNorm(256)
+        self.between = glorot(nn.Linear(256, 128))
+        self.norm = RowBatchNorm(128)
+        self.rest = nn.Sequential(nn.ReLU(), Dense(128, 128), glorot(nn.Linear(128, num_parts)))
+
+    def forward(self, points: Tensor, encoding: Encoding) -> Tensor:
+        """Return (B, n, num_parts) logits of the first n points of the encoded clouds."""
+        centres1, features1, features2 = encoding.intermediate
+        centres2 = centres1[:, : features2.shape[1]]  # (B, 128, 3)
+        cloud = encoding.features.unsqueeze(1).expand(-1, features2.shape[1], -1)  # (B, 128, 1024)
+        rows = self.second(torch.cat([features2, cloud], dim=-1))  # (B, 128, 256)
+        rows = self.first(features1) + interpolate(rows, centres2, centres1)  # (B, 512, 256)
+        rows = self.between(self.first_norm(rows).relu())  # (B, 512, 128)
+        rows = self.norm(interpolate(rows, centres1, points))  # (B, n, 128)
+        logits: Tensor = self.rest(rows)  # (B, n, num_parts)
+        return logits
+
+
+def interpolate(features: Tensor, centres: Tensor, points: Tensor) -> Tensor:
+    """Return the mean of the features of the three centres nearest to each point, weighted by 1 / distance^2.
+
+    Args:
+        features: (B, M, C) of the centres.
+        centres: (B, M, 3).
+        points: (B, N, 3).
+
+    Returns:
+        (B, N, C).
+    """
+    nearest = knn(points, centres, 3)  # (B, N, 3)
+    with full_precision(points):
+        squares = (gather_rows(centres, nearest) - points.unsqueeze(2)).square().sum(dim=-1)  # (B, N, 3)
+        weight = 1 / (squares + 1e-8)
+        weight = weight / weight.sum(dim=-1, keepdim=True)
+    mean: Tensor = (gather_rows(features, nearest) * weight.unsqueeze(-1).to(features.dtype)).sum(dim=2)
+    return mean

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Weights as safetensors with what is needed to use them; nothing is unpickled."""
+"""Weights of a network as safetensors, with the card that describes them in the metadata; nothing is unpickled."""
 
 from __future__ import annotations
 
@@ -19,6 +19,8 @@ from doorstate.networks.card import WeightsCard
 from doorstate.networks.head_layers import add_heads
 from doorstate.types import STATES
 
+_CARD_KEY = "doorstate"
+
 
 def save_weights(path: Path, network: PointNetwork, card: WeightsCard, half: bool = False) -> None:
     """Write parameters and running statistics, as float16 if `half`, in one step."""
@@ -27,56 +29,53 @@ def save_weights(path: Path, network: PointNetwork, card: WeightsCard, half: boo
         for name, tensor in network.state_dict().items()
     }
     with atomic_path(path) as temporary:
-        save_file(tensors, temporary, metadata={"doorstate": card.model_dump_json()})
+        save_file(tensors, temporary, metadata={_CARD_KEY: card.model_dump_json()})
 
 
 def read_card(path: Path) -> WeightsCard:
-    """What a weights file is for.
+    """Read the card of a weights file.
 
     Raises:
-        WeightsError: missing, damaged, or no weights of ours.
+        WeightsError: the file is missing, damaged, or has no card.
     """
     if not path.is_file():
-        raise WeightsError(f"{path}: no such weights file")
+        raise WeightsError("no such weights file", path=path)
     try:
         with safe_open(path, framework="pt") as weights:
             metadata = weights.metadata() or {}
-        return WeightsCard.model_validate_json(metadata["doorstate"])
+        return WeightsCard.model_validate_json(metadata[_CARD_KEY])
     except (OSError, SafetensorError) as error:
-        raise WeightsError(f"{path}: cannot be read as safetensors ({error})") from error
+        raise WeightsError(f"cannot be read as safetensors ({error})", path=path) from error
     except (KeyError, ValidationError) as error:
-        raise WeightsError(
-            f"{path}: does not say which network it is for: no weights of doorstate"
-        ) from error
+        raise WeightsError("has no valid card: not a weights file of doorstate", path=path) from error
 
 
 def load_weights(path: Path) -> tuple[PointNetwork, WeightsCard]:
-    """The network of a weights file, in evaluation mode, float32.
+    """Build the network of a weights file, in evaluation mode and float32.
 
     Raises:
-        WeightsError: missing, damaged, made for another network, other states or another scale.
+        WeightsError: the file is missing, damaged, or for another network, other states or another scale.
     """
     card = read_card(path)
     if card.states != STATES or card.scale_m != SCALE_M:
-        raise WeightsError(f"{path}: made for states {card.states} at scale {card.scale_m} m")
+        raise WeightsError(f"made for states {card.states} at scale {card.scale_m} m", path=path)
     try:
         network = create_network(card.network, num_classes=len(card.states), **card.network_options)
         add_heads(network, card.heads)
         load_into(network, path)
     except RuntimeError as error:
-        raise WeightsError(
-            f"{path}: does not fit network {card.network}: {str(error).splitlines()[0]}"
-        ) from error
+        reason = str(error).splitlines()[0]
+        raise WeightsError(f"does not fit network {card.network}: {reason}", path=path) from error
     return network.eval(), card
 
 
 def load_into(network: PointNetwork, path: Path) -> None:
-    """Copy the tensors of a weights file into a network that fits."""
+    """Copy the tensors of a weights file into a network, float16 as float32."""
     with safe_open(path, framework="pt") as weights:
-        state = {name: weights.get_tensor(name) for name in weights.keys()}  # noqa: SIM118 - not a dict
+        tensors = {name: weights.get_tensor(name) for name in weights.keys()}  # noqa: SIM118 - not a dict
     network.load_state_dict(
         {
             name: tensor.to(torch.float32) if tensor.is_floating_point() else tensor
-            for name, tensor in state.items()
+            for name, tensor in tensors.items()
         }
     )

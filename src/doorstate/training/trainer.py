@@ -18,7 +18,7 @@ from doorstate.errors import RunError
 from doorstate.networks.base import PointNetwork
 from doorstate.networks.card import WeightsCard
 from doorstate.networks.head_layers import joint_losses
-from doorstate.networks.layers import set_batchnorm
+from doorstate.networks.layers.batch_norm import set_batchnorm
 from doorstate.networks.weights import save_weights
 from doorstate.training.checkpoint import Checkpoint, EpochProgress, TrainingState
 from doorstate.training.config import RunConfig
@@ -131,7 +131,7 @@ class Trainer:
     def neighbours_are_fixed(self) -> bool:
         """True if augmentation leaves the neighbourhoods of a cloud as they are, so that one search is enough."""
         augmentation = self.config.recipe.augmentation
-        if self.network.neighbours_keep_under_scale:
+        if self.network.neighbours_are_scale_invariant:
             return augmentation.is_similarity
         return augmentation.is_rigid
 

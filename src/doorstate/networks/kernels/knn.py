@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Nearest neighbours, by all distances or by those between blocks of points that can matter.
+
+Both are exact. Coordinates keep full precision under autocast; no gradient flows through a choice.
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from doorstate.networks.kernels.distances import coordinate_distances, feature_distances
+from doorstate.networks.kernels.gather import gather_rows
+from doorstate.networks.kernels.knn_blocks import nearest_in_blocks
+from doorstate.networks.kernels.precision import at_least_float32, full_precision
+from doorstate.networks.kernels.spatial_order import BLOCK_SIZES, block_size, spatial_order
+
+_DISTANCES_PER_BLOCK = 2**19  # 2 MiB of float32 stay in a core's cache
+_FEWEST_POINTS = 1024  # below, all distances are cheaper than choosing which to compute
+
+
+def knn(query: Tensor, points: Tensor, k: int, *, in_order: bool = False) -> Tensor:
+    """Return the nearest neighbours, nearest first.
+
+    A query that equals the point of the same index is that point and comes first, before its duplicates: networks
+    query a prefix of the points, or points that begin with them.
+
+    Args:
+        query: (B, M, D).
+        points: (B, N, D).
+        k: number of neighbours; at most N are returned.
+        in_order: the points are in `spatial_order`, of themselves or of the points that they were computed from. Only
+            the time depends on it.
+
+    Returns:
+        (B, M, min(k, N)) int64 indices into points.
+    """
+    k = min(k, points.shape[1])
+    with full_precision(points):
+        query, points = at_least_float32(query.detach()), at_least_float32(points.detach())
+        if not _blocks_are_faster(query, points, k):
+            return _nearest_of_all(query, points, k)
+        indices = torch.arange(points.shape[1], device=points.device).expand(len(points), -1)
+        if in_order:
+            return nearest_in_blocks(query, points, indices, k)
+        order = spatial_order(points)
+        neighbours = nearest_in_blocks(gather_rows(query, order), gather_rows(points, order), order, k)
+        return torch.empty_like(neighbours).scatter_(1, order.unsqueeze(-1).expand_as(neighbours), neighbours)
+
+
+def _blocks_are_faster(query: Tensor, points: Tensor, k: int) -> bool:
+    return (
+        points.dtype == torch.float32
+        and points.shape[1] >= max(_FEWEST_POINTS, 8 * k)
+        and query.shape == points.shape
+        and block_size(points.shape[1]) in BLOCK_SIZES
+        and not torch.compiler.is_exporting()  # how many distances are needed depends on the points
+    )
+
+
+def _nearest_of_all(query: Tensor, points: Tensor, k: int) -> Tensor:
+    """Search by all distances: of coordinates by exact differences, of features by a matrix product."""
+    squared_distances = coordinate_distances if points.shape[2] == 3 else feature_distances
+    block_size = max(1, _DISTANCES_PER_BLOCK // points.shape[1])
+    if torch.compiler.is_exporting():  # a graph would hold every block's operations
+        block_size = query.shape[1]
+    neighbours = []
+    for start in range(0, query.shape[1], block_size):
+        block = query[:, start : start + block_size]
+        distances = squared_distances(block, points)  # (B, m, N)
+        twins = points[
+            :, start : start + block.shape[1]
+        ]  # fewer than the block, or none, if there are more queries than points
+        same = (block[:, : twins.shape[1]] == twins).all(-1, keepdim=True)  # (B, m, 1)
+        same_index = torch.arange(start, start + twins.shape[1], device=points.device)  # (m,)
+        column = same_index.view(1, -1, 1).expand_as(same)
+        with_twin = distances[:, : twins.shape[1]]
+        with_twin.scatter_(2, column, torch.where(same, -torch.inf, with_twin.gather(2, column)))
+        neighbours.append(distances.topk(k, largest=False).indices)
+    return torch.cat(neighbours, dim=1)
