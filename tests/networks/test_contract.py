@@ -193,9 +193,9 @@ def test_label_smoothing_is_spread_over_all_classes() -> None:
 
 @pytest.mark.parametrize("shape", [(2, 127, 3), (2, 128, 4), (128, 3)])
 def test_unusable_points_are_refused(network: PointNetwork, shape: tuple[int, ...]) -> None:
-    with pytest.raises(CloudContentError, match="at least 128 points"):
+    with pytest.raises(CloudContentError):
         network(torch.zeros(shape))
-    with pytest.raises(CloudContentError, match="at least 128 points"):
+    with pytest.raises(CloudContentError):
         network.training_loss(torch.zeros(shape), LABELS)
 
 

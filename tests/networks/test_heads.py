@@ -62,16 +62,22 @@ def test_targets_are_in_the_units_of_the_normalised_cloud() -> None:
     assert all(values.dtype == np.float32 for values in targets.values())
 
 
+def test_truth_is_read_from_nested_columns_of_published_manifests() -> None:
+    row = WITHOUT_DOOR | {"hinge": "", "door.hinge": "right", "door.opening_width_m": "0.9"}
+    assert HEADS["hinge"].truth([row]).tolist() == [[0]]
+    assert HEADS["widths"].truth([row])[0, 0] == 0.9
+
+
 def test_only_the_named_heads_have_targets() -> None:
     assert list(head_targets([ROW], np.zeros((1, 3), np.float32), ["widths", "parts"])) == ["widths"]
 
 
-def test_rows_of_the_first_preset_have_all_but_the_passable_width() -> None:
+def test_targets_of_a_drawn_row() -> None:
     row = flatten(draw_rows(PRESETS["ogurob"], 3, 700)[1])
     targets = head_targets([row], np.zeros((1, 3), dtype=np.float32))
     assert targets["hinge"][0, 0] == 1
     assert targets["widths"][0, 0] * SCALE_M == pytest.approx(0.9)
-    assert np.isnan(targets["widths"][0, 1])
+    assert targets["widths"][0, 1] * SCALE_M == pytest.approx(float(row["passable_width_m"]))
     x, y, normal = targets["frame"][0]
     assert math.hypot(x, y) * SCALE_M == pytest.approx(float(row["distance_m"]), rel=1e-6)
     # The camera stands on the side that the normal points to.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Weights survive the file, and a file that does not fit says so."""
+"""Weights survive the file; files that do not fit are refused."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from doorstate.networks.weights import WeightsCard, load_weights, read_card, sav
 
 
 @pytest.mark.parametrize("name", list_networks())
-def test_a_network_comes_back_as_it_was(name: str, tmp_path: Path) -> None:
+def test_a_network_survives_the_file(name: str, tmp_path: Path) -> None:
     network = create_network(name, batchnorm_eps=1e-3).eval()
     card = WeightsCard(network=name, network_options={"batchnorm_eps": 1e-3}, num_points=256)
     save_weights(tmp_path / "w.safetensors", network, card)
-    loaded, found = load_weights(tmp_path / "w.safetensors")
+    loaded, loaded_card = load_weights(tmp_path / "w.safetensors")
     points = torch.rand(2, 256, 3)
     with torch.no_grad():
         torch.testing.assert_close(loaded(points), network(points), rtol=0, atol=0)
-    assert found == card
+    assert loaded_card == card
     assert not loaded.training
 
 
-def test_half_precision_halves_the_file_and_hardly_changes_the_answer(tmp_path: Path) -> None:
+def test_half_precision_halves_the_file_and_hardly_changes_the_probabilities(tmp_path: Path) -> None:
     network = create_network("pointnet2").eval()
     card = WeightsCard(network="pointnet2", num_points=256)
     save_weights(tmp_path / "full.safetensors", network, card)
@@ -42,35 +42,41 @@ def test_half_precision_halves_the_file_and_hardly_changes_the_answer(tmp_path: 
         torch.testing.assert_close(loaded(points).softmax(1), network(points).softmax(1), rtol=0, atol=5e-3)
 
 
-def test_a_missing_file_is_named(tmp_path: Path) -> None:
-    with pytest.raises(WeightsError, match=r"gone\.safetensors: no such weights file"):
-        read_card(tmp_path / "gone.safetensors")
+def test_a_missing_file_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "gone.safetensors"
+    with pytest.raises(WeightsError) as caught:
+        read_card(path)
+    assert caught.value.path == path
 
 
 @pytest.mark.parametrize("data", [b"", b"{}", b"\xff" * 100, pickle.dumps({"a": 1})])
-def test_what_is_no_safetensors_is_refused(data: bytes, tmp_path: Path) -> None:
+def test_files_of_other_formats_are_refused(data: bytes, tmp_path: Path) -> None:
     path = tmp_path / "w.safetensors"
     path.write_bytes(data)
-    with pytest.raises(WeightsError, match="cannot be read as safetensors"):
+    with pytest.raises(WeightsError) as caught:
         load_weights(path)
+    assert caught.value.path == path
 
 
-def test_somebody_elses_safetensors_are_refused(tmp_path: Path) -> None:
-    save_file({"a": torch.zeros(1)}, tmp_path / "w.safetensors")
-    with pytest.raises(WeightsError, match="no weights of doorstate"):
-        load_weights(tmp_path / "w.safetensors")
+def test_safetensors_without_a_card_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "w.safetensors"
+    save_file({"a": torch.zeros(1)}, path)
+    with pytest.raises(WeightsError) as caught:
+        load_weights(path)
+    assert caught.value.path == path
 
 
-def test_weights_of_another_network_do_not_fit(tmp_path: Path) -> None:
-    save_weights(
-        tmp_path / "w.safetensors", create_network("pointnet"), WeightsCard(network="dgcnn", num_points=256)
-    )
-    with pytest.raises(WeightsError, match="does not fit network dgcnn"):
-        load_weights(tmp_path / "w.safetensors")
-
-
-def test_other_states_or_scale_are_refused(tmp_path: Path) -> None:
-    card = WeightsCard(network="pointnet", num_points=256, scale_m=1.0)
-    save_weights(tmp_path / "w.safetensors", create_network("pointnet"), card)
-    with pytest.raises(WeightsError, match=r"at scale 1\.0 m"):
-        load_weights(tmp_path / "w.safetensors")
+@pytest.mark.parametrize(
+    "card",
+    [
+        WeightsCard(network="dgcnn", num_points=256),
+        WeightsCard(network="pointnet", num_points=256, scale_m=1.0),
+        WeightsCard(network="pointnet", num_points=256, states=("open", "closed")),
+    ],
+)
+def test_weights_of_another_network_scale_or_states_are_refused(card: WeightsCard, tmp_path: Path) -> None:
+    path = tmp_path / "w.safetensors"
+    save_weights(path, create_network("pointnet"), card)
+    with pytest.raises(WeightsError) as caught:
+        load_weights(path)
+    assert caught.value.path == path
