@@ -1,8 +1,112 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Run a command of the paper package."""
+"""Command line of the paper: run, publish and render experiments, package weights, write pages, check all."""
 
-import sys
+from __future__ import annotations
 
-from .reproduce import main
+from pathlib import Path
+from typing import Annotated
 
-main(sys.argv[1:])
+import typer
+
+app = typer.Typer(no_args_is_help=True, add_completion=False, help=__doc__)
+
+Name = Annotated[str, typer.Argument(help="File of paper/experiments/, without .toml.")]
+
+
+@app.command()
+def run(experiment: Name) -> None:
+    """Make the data of an experiment and run it, from nothing or from where it stopped."""
+    from .run import run as run_experiment
+
+    run_experiment(experiment)
+
+
+@app.command()
+def repeat(
+    network: Annotated[str, typer.Argument(help="Network of the experiment.")],
+    fold: Annotated[int, typer.Argument(help="Fold, from 0.")],
+    experiment: Annotated[str, typer.Option(help="Published comparison.")] = "paper",
+) -> None:
+    """Train one published run from nothing; exit code 1 if its score leaves the published spread."""
+    from .run import repeat_run
+
+    now, before, allowed = repeat_run(network, fold, experiment)
+    print(
+        f"{network}, fold {fold}: macro F1 {now:.4f}, published {before:.4f}, allowed difference {allowed:.4f}"
+    )
+    if abs(now - before) > allowed:
+        raise typer.Exit(1)
+
+
+@app.command()
+def publish(experiments: Annotated[list[str], typer.Argument(help="Experiments in runs/.")]) -> None:
+    """Write finished runs into results/."""
+    from .publish import publish as publish_experiment
+
+    for name in experiments:
+        print(publish_experiment(name))
+
+
+@app.command()
+def report(
+    experiment: Name,
+    out: Annotated[Path | None, typer.Option(help="Folder; build/EXPERIMENT if not given.")] = None,
+) -> None:
+    """Render tables, figures and HTML of a published experiment."""
+    from .report import write_published_report
+
+    print(write_published_report(experiment, out))
+
+
+@app.command()
+def pages() -> None:
+    """Write the pages of docs/ that are computed."""
+    from .pages.render import write_pages
+
+    for path in write_pages():
+        print(path)
+
+
+@app.command()
+def pictures(
+    names: Annotated[
+        list[str] | None, typer.Argument(help="Pictures of docs/images; all if not given.")
+    ] = None,
+) -> None:
+    """Draw the pictures of docs/images."""
+    from .pictures import draw
+
+    for path in draw(names or ()):
+        print(path)
+
+
+@app.command()
+def weights(
+    experiment: Name,
+    prefix: Annotated[str, typer.Option(help="Prefix of the names of the files.")] = "",
+    networks: Annotated[
+        str, typer.Option(help="Networks, separated by commas; all that are trained if empty.")
+    ] = "",
+    out: Annotated[Path | None, typer.Option(help="Folder; that of the package if not given.")] = None,
+) -> None:
+    """Store trained weights as float16 with calibration and model cards."""
+    from .weights import package_weights
+
+    chosen = [name.strip() for name in networks.split(",") if name.strip()]
+    for path in package_weights(experiment, prefix, chosen, out):
+        print(f"{path}: {path.stat().st_size / 1e6:.1f} MB")
+
+
+@app.command()
+def check() -> None:
+    """Compare pages, scores and pictures with what results/ gives; exit code 1 if something differs."""
+    from .check import check as check_all
+
+    problems = check_all()
+    print("\n".join(problems) or "all published numbers follow from results/")
+    if problems:
+        raise typer.Exit(1)
+
+
+if __name__ == "__main__":
+    app(prog_name="python -m paper")

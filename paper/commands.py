@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`doorstate` commands that other tools run, shown as anybody can type them."""
+"""Commands of `doorstate` as subprocesses in the repository, printed as anybody can type them."""
 
 from __future__ import annotations
 
@@ -10,19 +10,20 @@ from pathlib import Path
 
 from doorstate.dataset.store import is_prepared
 
-REPOSITORY = Path(__file__).resolve().parents[1]
+from .paths import REPOSITORY
 
 
-def doorstate(arguments: str, makes: Path | None = None) -> None:
-    """Print and run one command in the repository; its error ends the tool.
+def doorstate(arguments: str, prepared: Path | None = None) -> None:
+    """Print and run one command; exit with its code if it fails.
 
     Args:
         arguments: after `doorstate`.
-        makes: a prepared data set; where it is there in the end, exit code 1 says that some clouds were left out.
+        prepared: data set that the command makes. If it exists afterwards, exit code 1 means that some clouds were
+            left out, which is no failure.
     """
     print(f"\n$ doorstate {arguments}", flush=True)
     program = Path(sys.executable).with_name("doorstate")
     finished = subprocess.run([program, *shlex.split(arguments)], cwd=REPOSITORY, check=False)
-    left_some_out = finished.returncode == 1 and makes is not None and is_prepared(makes)
-    if finished.returncode and not left_some_out:
+    is_partial = finished.returncode == 1 and prepared is not None and is_prepared(prepared)
+    if finished.returncode and not is_partial:
         sys.exit(finished.returncode)

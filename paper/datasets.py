@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The data sets of the experiments, by name, and the commands that make them; `data/NAME-POINTS` is prepared.
+"""Data sets of the experiments by name, and the commands that make them; `data/NAME-POINTS` is prepared.
 
-One seed is one set of scenes: data sets of different sensors that share it show the same doors. Whatever is mixed has a
-seed of its own.
+A seed is a set of scenes: data sets of different sensors with the same seed show the same doors. Data sets that are
+mixed have seeds of their own.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from doorstate.dataset.store import is_prepared
 
 SIMULATED = {
     "ogurob": "--preset ogurob",
-    # To train on, alone and mixed; `varied` is `varied-xtion` without noise.
+    # Training sets, alone and mixed; `varied` is `varied-xtion` without noise.
     "varied": "--preset varied --scenes 1200 --seed 11",
     "varied-xtion": "--preset varied --scenes 1200 --seed 11 --sensor xtion",
     "varied-d435": "--preset varied --scenes 900 --seed 12 --sensor d435",
@@ -27,7 +27,7 @@ SIMULATED = {
     "no-door-deepdoors2": "--preset no-door --scenes 300 --seed 18 --sensor deepdoors2",
     "varied-clean": "--preset varied --scenes 400 --seed 19",
     "no-door-clean": "--preset no-door --scenes 200 --seed 20",
-    # To learn besides: twice as many other scenes of the same presets and cameras, more of the Xtion's among them.
+    # Extra training sets: twice as many other scenes of the same presets and cameras, with a larger share of the Xtion.
     "more-varied-xtion": "--preset varied --scenes 2600 --seed 41 --sensor xtion",
     "more-varied-d435": "--preset varied --scenes 1300 --seed 42 --sensor d435",
     "more-varied-deepdoors2": "--preset varied --scenes 500 --seed 43 --sensor deepdoors2",
@@ -38,7 +38,7 @@ SIMULATED = {
     "more-no-door-deepdoors2": "--preset no-door --scenes 250 --seed 48 --sensor deepdoors2",
     "more-varied-clean": "--preset varied --scenes 300 --seed 49",
     "more-no-door-clean": "--preset no-door --scenes 100 --seed 50",
-    # To test on: the same doors, whatever measures them.
+    # Test sets: the same doors for every sensor.
     **{
         f"test-{name}": f"--preset varied --scenes 100 --seed 21 --sensor {sensor}"
         for name, sensor in (
@@ -50,7 +50,7 @@ SIMULATED = {
     "test-angles": "--preset varied-angles --scenes 200 --seed 22 --sensor xtion",
     "test-cluttered": "--preset cluttered --scenes 300 --seed 23 --sensor xtion",
 }
-# Every camera sees doors and walls without one: what a camera looks like must not tell them apart.
+# Every camera sees doors and bare walls: the noise of a camera must not tell them apart.
 _MIXED = (
     "varied-xtion",
     "varied-d435",
@@ -64,29 +64,32 @@ _MIXED = (
     "no-door-clean",
 )
 JOINED = {"mixture": _MIXED, "more-mixture": tuple(f"more-{part}" for part in _MIXED)}
-# The D435 sees 10 m, all others 5 or less. Doors are within 3.5 m, and farthest-point sampling spends its points on
-# space, which behind an open door is mostly the end of the next room. Thinned as a predictor thins.
-BEYOND = "--thin --max-depth-m 5"
+# The D435 reaches 10 m, all others 5 m or less. Doors are within 3.5 m; without a limit, farthest-point sampling would
+# spend most points on the next room behind an open door. Clouds are thinned as a predictor thins them.
+LIMITS = "--thin --max-depth-m 5"
 
 
 class Command(NamedTuple):
-    """Arguments of `doorstate`, and the prepared data set that they make."""
+    """Arguments of `doorstate` and the prepared data set that they make."""
 
     arguments: str
-    makes: Path
+    prepared: Path
 
 
 def commands(prepared: Path) -> Iterator[Command]:
-    """What `doorstate` has to be called with, in this order, for `data/NAME-POINTS`; steps that are done cost nothing.
+    """Yield the commands that make a data set, in order; a command whose work is done costs nothing.
+
+    Args:
+        prepared: folder `data/NAME-POINTS`.
 
     Raises:
         KeyError: no such data set.
     """
     name, _, points = prepared.name.rpartition("-")
     if name not in JOINED:
-        options = "" if name.endswith("ogurob") else f" {BEYOND}"
-        made = f"--prepared data/{name}-{points} --points {points}{options}"
-        yield Command(f"simulate {SIMULATED[name]} --out data/{name} {made}", prepared)
+        options = "" if name.endswith("ogurob") else f" {LIMITS}"
+        output = f"--prepared data/{name}-{points} --points {points}{options}"
+        yield Command(f"simulate {SIMULATED[name]} --out data/{name} {output}", prepared)
     elif not is_prepared(prepared):
         parts = [prepared.with_name(f"{part}-{points}") for part in JOINED[name]]
         for part in parts:

@@ -1,265 +1,178 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Put trained weights into the package, as float16, with a model card each.
+"""Store trained weights for the package, with calibration and model cards.
 
-python tools/package_weights.py runs/mixture-wide   # default weights, after `make publish EXPERIMENT=mixture-wide`
-python tools/package_weights.py runs/weights ogurob-  # with a name before the network's
-
-Weights of protocol `all` have seen every sample: how well their recipe does and how sure the answers are comes from the
-published cross-validations. Others were tested themselves, and what is published of that test is what the card shows.
-What tells of the packaged weights elsewhere is to be made anew then: CONTRIBUTING.md, "Publishing".
+Weights of protocol `all` were trained on every sample; the published cross-validations of their recipe stand for them.
+Other weights were tested, and their own published test counts.
 """
 
 from __future__ import annotations
 
-import hashlib
 import sys
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
-from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from doorstate.evaluation.heads import head_rows
 
 from doorstate._files import write_text
-from doorstate.clouds.augmentation import Augmentation
-from doorstate.dataset.store import open_dataset
-from doorstate.evaluation.calibration import calibrate, reliability
-from doorstate.evaluation.factors import factors_table, kinds_table
-from doorstate.evaluation.head_tables import answers_table, four_answers_table, presence_table
-from doorstate.evaluation.metrics import scores
-from doorstate.evaluation.resolution import fewest_points
-from doorstate.evaluation.results import Answers, ComparisonResults, Predictions, load_results
-from doorstate.evaluation.score_tables import pooled_confusion
-from doorstate.evaluation.table import Table
+from doorstate.evaluation.calibration import calibrate, labels_and_probabilities, reliability
+from doorstate.evaluation.comparison import Results
+from doorstate.evaluation.resolution import fewest_points, score_resolution
 from doorstate.networks.weights import load_weights, save_weights
 from doorstate.training.calibration import abstain_threshold, at_temperature
-from doorstate.training.run_folder import read_json, run_of
-from doorstate.types import DECISION_THRESHOLD, STATES
+from doorstate.training.comparison import read_comparison
+from doorstate.training.run_folder import run_of
+from doorstate.types import DECISION_THRESHOLD, NO_DOOR
 
-from .pages.results import NAMES
-from .pages.templates import template
-from .pages.zoo import PAGE, page
-from .publish import rows_of
-from .studies import Asked, read_asked, resolution_results, study_table
+from . import paths
+from .cards import Training, model_card
+from .definition import Definition, read_definitions
+from .published import comparison, study
 
-REPOSITORY = Path(__file__).resolve().parents[1]
-RESULTS, EXPERIMENTS = REPOSITORY / "results", REPOSITORY / "paper" / "experiments"
-WEIGHTS = REPOSITORY / "src" / "doorstate" / "networks" / "pretrained"
-_MANY = 30e6  # bytes of one set of networks: 19 MB without heads, which take half as much again
-_FEWEST, _LOST = (
+FEWEST_POINTS, LARGEST_LOSS = (
     1024,
     0.002,
-)  # default points are no fewer, and lose no more macro-F1 on samples never learned from
-_WRONG_SHARE = (
-    0.05  # of the validation samples that are answered at all; with less, few would be (paper/log.md)
-)
+)  # default points: not fewer, and no larger loss of macro F1 on unseen samples
+WRONG_SHARE = 0.05  # of validation samples with a state; a smaller share leaves few of them (paper/log.md)
+RECIPE_PROTOCOLS = ("paper", "by-pose")
 
 
-class Evidence(NamedTuple):
-    """What is published of a network, as its weights and its card need it."""
+@dataclass(frozen=True)
+class Evidence:
+    """Published scores of weights or of their recipe.
+
+    Attributes:
+        temperature: divides the logits.
+        abstain_below: probability below which the weights abstain.
+        default_points: number of points that loses nothing; None if no study tells.
+        calibration_error: after scaling.
+        comparisons: published results to show on the card.
+        named: share of tested doors that are given a state, and share of these that is correct; None without threshold.
+    """
 
     temperature: float
     abstain_below: float
     default_points: int | None
-    card: str  # template
-    shown: dict[str, Any]  # in it
+    calibration_error: float
+    comparisons: tuple[Results, ...]
+    named: tuple[float, float] | None = None
 
 
-def main(folder: str, prefix: str = "") -> None:
-    """Package every network of a comparison that has been trained there.
+def package_weights(
+    experiment: str, prefix: str = "", networks: Sequence[str] = (), out: Path | None = None
+) -> list[Path]:
+    """Store the trained networks of `runs/EXPERIMENT` as float16, with a model card beside each.
 
     Args:
-        folder: of the comparison.
-        prefix: what comes before a network's name in the name of its weights.
+        experiment: whose results are published, unless its protocol is `all`.
+        prefix: before the network's name in the name of the file.
+        networks: to store; all that are trained if empty.
+        out: folder; that of the package if not given.
+
+    Returns:
+        Paths of the weights files.
     """
-    asked = read_json(Path(folder) / "comparison.json")
-    evidence = _of_recipe() if asked["protocol"] == "all" else _of_weights(asked["name"])
-    unchanged = Augmentation().model_dump(mode="json")
-    paths = []
-    for network_name in asked["networks"]:
-        name = f"{prefix}{network_name}"
-        run = run_of(Path(folder), network_name, 0)
+    folder = paths.RUNS / experiment
+    config = read_comparison(folder)
+    stored = []
+    for network_name in networks or config["networks"]:
+        run = run_of(folder, network_name, 0)
         if not (run.finished and run.weights.is_file()):
-            print(f"{name}: not trained in {folder}, left as it is")
             continue
         network, card = load_weights(run.weights)
-        found = evidence(network_name, card.num_points)
-        target = WEIGHTS / f"{name}.safetensors"
+        if config["protocol"] == "all":
+            evidence = recipe_evidence(network_name, card.num_points)
+        else:
+            evidence = test_evidence(experiment, network_name, card.num_points)
         card = card.model_copy(
             update={
-                "temperature": found.temperature,
-                "abstain_below": found.abstain_below,
-                "default_points": found.default_points,
+                "temperature": evidence.temperature,
+                "abstain_below": evidence.abstain_below,
+                "default_points": evidence.default_points,
             }
         )
-        save_weights(target, network, card, half=True)
-        metrics, config = run.read_metrics(), read_json(run.config)
-        recipe = config["recipe"]
-        text = template(found.card).render(
-            name=name,
-            title=NAMES[network_name],
-            parameters=sum(p.numel() for p in network.parameters()),
-            recipe=recipe,
-            begun=config.get("start_from") and Path(asked["start_from"]).name,
-            augmentation={
-                key.replace("_", " "): value
-                for key, value in recipe["augmentation"].items()
-                if value != unchanged[key]
-            },
-            environment=read_json(run.environment),
-            minutes=metrics["seconds"] / 60,
-            samples=metrics["train_samples"],
-            weights=card,
-            temperature=found.temperature,
-            abstain_below=found.abstain_below,
-            states=STATES,
-            megabytes=target.stat().st_size / 1e6,
-            sha256=hashlib.sha256(target.read_bytes()).hexdigest(),
-            **found.shown,
-        )
-        write_text(target.with_suffix(".md"), text)
-        paths.append(target)
-        print(f"{target}: {target.stat().st_size / 1e6:.1f} MB")
-    write_text(PAGE, page())
-    total = sum(path.stat().st_size for path in paths)
-    print(f"together {total / 1e6:.1f} MB")
-    if total > _MANY:
-        sys.exit(f"more than {_MANY / 1e6:.0f} MB: too much for the package")
+        path = (out or paths.PRETRAINED) / f"{prefix}{network_name}.safetensors"
+        save_weights(path, network, card, half=True)
+        parameters = sum(parameter.numel() for parameter in network.parameters())
+        write_text(path.with_suffix(".md"), model_card(path, card, parameters, Training.read(run), evidence))
+        stored.append(path)
+    return stored
 
 
-def _of_recipe() -> Callable[[str, int], Evidence]:
-    """Scores of the recipe, cross-validated over the folds of two protocols."""
-    rows = RESULTS / "ogurob-4096"
-    paper, by_pose = (load_results(RESULTS / name, rows) for name in ("paper", "by-pose"))
-
-    def evidence(network: str, trained_points: int) -> Evidence:
-        calibrated = calibrate(paper, network)
-        if calibrated is None:
-            sys.exit(f"results/paper: no validation answers of {network}")
-        return Evidence(
-            round(median(calibrated.temperatures), 4),
-            0.0,
-            _default_points("by-pose", network, trained_points),
-            "ogurob_card.md.j2",
-            {
-                "tables": _tables_of(network, _study_tables("by-pose")),
-                "error": reliability(calibrated.true, calibrated.scaled).error,
-                "found": [
-                    {"protocol": each.comparison.protocol, **_scores(each, network)}
-                    for each in (paper, by_pose)
-                ],
-            },
-        )
-
-    return evidence
-
-
-def _of_weights(experiment: str) -> Callable[[str, int], Evidence]:
-    """Scores of the very weights on test samples of their own, in their world and in others."""
-    comparison = RESULTS / experiment
-    if not comparison.is_dir():
-        sys.exit(f"{comparison}: not published yet")
-    rows = rows_of(comparison, RESULTS)
-    results, dataset = load_results(comparison, rows), open_dataset(rows)
-
-    def evidence(network: str, trained_points: int) -> Evidence:
-        (run,) = results.runs_of(network)
-        calibrated = calibrate(results, network)
-        if calibrated is None or run.validation is None:
-            sys.exit(f"{comparison}: no validation answers of {network}")
-        temperature = round(calibrated.temperatures[0], 4)
-        validated = at_temperature(run.validation.probabilities, temperature)
-        threshold = abstain_threshold(validated, run.validation.true, _WRONG_SHARE)
-        given = results.answers(network)
-        answered = (calibrated.scaled.max(axis=1) >= threshold) & _seems_a_door(
-            results.pooled(network), given
-        )
-        right = calibrated.scaled.argmax(axis=1) == calibrated.true
-        tables = [
-            make(results, dataset)
-            for make in (answers_table, four_answers_table, presence_table, kinds_table, factors_table)
-        ]
-        return Evidence(
-            temperature,
-            threshold,
-            _default_points(experiment, network, trained_points),
-            "mixture_card.md.j2",
-            {
-                "error": reliability(calibrated.true, calibrated.scaled).error,
-                "found": _scores(results, network),
-                "wrong_share": _WRONG_SHARE,
-                "answered": float(answered.mean()),
-                "right_of_answered": float(np.mean(right[answered])) if answered.any() else float("nan"),
-                "tables": _tables_of(network, (*tables, *_study_tables(experiment))),
-            },
-        )
-
-    return evidence
-
-
-def _seems_a_door(pooled: Predictions, given: Answers | None) -> NDArray[np.bool_]:
-    """Of which samples a predictor would not say that there is no door."""
-    if given is None or "p_door" not in given.columns:
-        return np.ones(len(pooled), bool)
-    p_door = dict(zip(given.sample_ids, given.columns["p_door"], strict=True))
-    return np.array([p_door[sample] >= DECISION_THRESHOLD for sample in pooled.sample_ids])
-
-
-def _studies(experiment: str) -> Iterator[Asked]:
-    """Published studies of the weights of an experiment; what is published of other weights ends the tool."""
-    for asked in map(read_asked, sorted(EXPERIMENTS.glob("*.toml"))):
-        if asked.command == "compare" or experiment not in asked.begins_with:
-            continue
-        published = list((RESULTS / asked.name).rglob("comparison.json"))
-        begun_with = {Path(read_json(path)["start_from"]).name for path in published}
-        if published and experiment not in begun_with:
-            sys.exit(
-                f"{RESULTS / asked.name}: is of {' and '.join(sorted(begun_with))}, not of {experiment}: "
-                f"make reproduce EXPERIMENT={asked.name}, publish, and package again"
-            )
-        if published:
-            yield asked
-
-
-def _study_tables(experiment: str) -> Iterator[Table]:
-    return (study_table(asked, RESULTS) for asked in _studies(experiment))
-
-
-def _default_points(experiment: str, network: str, trained: int) -> int | None:
-    """As few points as lose nothing, as the study of an experiment's weights tells; None if it tells nothing."""
-    for asked in _studies(experiment):
-        if asked.command == "resolution":
-            return fewest_points(resolution_results(asked, RESULTS), network, _FEWEST, trained, _LOST)
-    return None
-
-
-def _tables_of(network: str, tables: Iterable[Table]) -> list[str]:
-    parts = (_of_network(table, network) for table in tables)
-    return [part.to_markdown().strip() for part in parts if part.rows]
-
-
-def _of_network(table: Table, network: str) -> Table:
-    """The lines of one network, without its name before each."""
-    return replace(
-        table,
-        columns=table.columns[1:],
-        rows=tuple(row[1:] for row in table.rows if row[0] == network),
-        text_columns=max(1, table.text_columns - 1),
+def recipe_evidence(network: str, trained_points: int) -> Evidence:
+    """Return the evidence for weights of the common recipe that were trained on every sample of `ogurob`."""
+    paper, by_pose = (comparison(name) for name in RECIPE_PROTOCOLS)
+    calibration = calibrate(paper, network)
+    if calibration is None:
+        sys.exit(f"results/paper: no validation predictions of {network}")
+    return Evidence(
+        temperature=round(median(calibration.temperatures), 4),
+        abstain_below=0.0,
+        default_points=default_points("by-pose", network, trained_points),
+        calibration_error=reliability(calibration.true, calibration.scaled).error,
+        comparisons=(paper, by_pose),
     )
 
 
-def _scores(results: ComparisonResults, network: str) -> dict[str, object]:
-    score = scores(pooled_confusion(results, network))
-    return {
-        "samples": len(results.pooled(network)),
-        "macro_f1": float(score.macro.f1),
-        "recall": dict(zip(STATES, score.recall.tolist(), strict=True)),
-    }
+def test_evidence(experiment: str, network: str, trained_points: int) -> Evidence:
+    """Return the evidence for weights that were tested on samples of their own."""
+    results = comparison(experiment)
+    calibration = calibrate(results, network)
+    if calibration is None:
+        sys.exit(f"results/{experiment}: no validation predictions of {network}")
+    temperature = round(calibration.temperatures[0], 4)
+    rows = results.predictions
+    validation = rows[(rows["method"] == network) & (rows["role"] == "val") & (rows["state"] != NO_DOOR)]
+    labels, probabilities = labels_and_probabilities(validation)
+    threshold = abstain_threshold(at_temperature(probabilities, temperature), labels, WRONG_SHARE)
+    named = (calibration.scaled.max(axis=1) >= threshold) & _likely_a_door(results, network)
+    correct = calibration.scaled.argmax(axis=1) == calibration.true
+    return Evidence(
+        temperature=temperature,
+        abstain_below=threshold,
+        default_points=default_points(experiment, network, trained_points),
+        calibration_error=reliability(calibration.true, calibration.scaled).error,
+        comparisons=(results,),
+        named=(float(named.mean()), float(correct[named].mean()) if named.any() else float("nan")),
+    )
 
 
-if __name__ == "__main__":
-    if len(sys.argv) not in (2, 3):
-        sys.exit(__doc__)
-    main(*sys.argv[1:])
+def default_points(experiment: str, network: str, trained: int) -> int | None:
+    """Return the fewest points that lose nothing, by the published study of an experiment's weights."""
+    for definition in studies_of(experiment):
+        if definition.command == "resolution":
+            scores = score_resolution(study(definition.name))
+            return fewest_points(scores, network, FEWEST_POINTS, trained, LARGEST_LOSS)
+    return None
+
+
+def studies_of(experiment: str) -> list[Definition]:
+    """Return the published studies of an experiment's weights.
+
+    A study that was published with other weights ends the program.
+    """
+    found = []
+    for definition in read_definitions():
+        if not (definition.is_study and experiment in definition.starts_from):
+            continue
+        if not (paths.RESULTS / definition.name).is_dir():
+            continue
+        parts = study(definition.name).parts.values()
+        starts = {Path(str((part.config.model_extra or {}).get("start_from"))).name for part in parts}
+        if experiment not in starts:
+            sys.exit(
+                f"results/{definition.name} tests weights of {' and '.join(sorted(starts))}: run it again"
+            )
+        found.append(definition)
+    return found
+
+
+def _likely_a_door(results: Results, network: str) -> np.ndarray:
+    """Return for each tested door whether a door is likelier than none; True without that head."""
+    tested = results.tested_by(network)
+    rows = head_rows(results, network)
+    if rows is None or "p_door" not in rows:
+        return np.ones(len(tested), bool)
+    return (tested["p_door"] >= DECISION_THRESHOLD).to_numpy()

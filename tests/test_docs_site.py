@@ -10,7 +10,6 @@ from pathlib import Path
 from urllib.parse import unquote, urldefrag
 
 import pytest
-from paper.pages import zoo
 
 pytest.importorskip("sphinx")
 
@@ -80,7 +79,3 @@ def test_links_of_the_markdown_exist_where_github_looks_for_them() -> None:
         if "://" not in address and not (page.parent / address).exists()
     ]
     assert missing == []
-
-
-def test_the_model_zoo_is_what_code_and_weights_give() -> None:
-    assert zoo.page() == zoo.PAGE.read_text(encoding="utf-8")

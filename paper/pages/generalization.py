@@ -1,128 +1,137 @@
 # SPDX-License-Identifier: Apache-2.0
-"""docs/generalization.md: figures of the mixture's weights and of the transfer studies."""
+"""Values of docs/generalization.md: many doors, noise, clutter, bare walls, and how far weights transfer."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
+from collections.abc import Mapping
+from typing import Any
 
-from doorstate.dataset.store import open_dataset
-from doorstate.evaluation.factors import ANGLE, OCCLUSION, factor_bins
-from doorstate.evaluation.results import load_results
-from doorstate.evaluation.table import Table, number
-from doorstate.networks import list_networks
-from doorstate.training.run_folder import read_json
+from doorstate.evaluation.heads import score_four_labels, score_heads, score_presence
+from doorstate.evaluation.method_scores import summarize_methods
+from doorstate.evaluation.undecidable import decidable_accuracy
 
-from ..publish import rows_of
-from .pairwise import FEW_PIXELS, NEARBY_M, cases_table
-from .results import NAMES, render, whole_folds
-from .targets import AT_4096, CLUTTER, MIXTURE, Published, targets_table
+from doorstate.evaluation.comparison import Results
+from doorstate.evaluation.factors import ANGLE, OCCLUSION, score_factors
+from doorstate.evaluation.table import (
+    Table,
+    count_column,
+    interval_column,
+    label_column,
+    number,
+    number_column,
+)
+from doorstate.evaluation.transfer import score_transfer, transfer_grid
 
-FEW_MEASURED = 150_000  # of the 307,200 pixels of an image
-# Where there is little to fit a plane to, or the planes are not those of leaf and wall.
-CASES: dict[str, Callable[[Mapping[str, str]], bool]] = {
-    "all doors": lambda row: True,
-    "a window in the leaf": lambda row: row["door_kind"] == "glazed",
-    "a leaf of glass": lambda row: row["door_kind"] == "full_glass",
-    "sliding": lambda row: row["door_kind"] == "sliding",
-    "two leaves": lambda row: row["door_kind"].startswith("double"),
-    "a quarter of the door hidden, or more": lambda row: float(row["occluded_share"]) >= 0.25,
-    f"leaf below {FEW_PIXELS} pixels": lambda row: float(row["visible_leaf_px"]) < FEW_PIXELS,
-    f"frame below {FEW_PIXELS} pixels": lambda row: float(row["visible_frame_px"]) < FEW_PIXELS,
-    f"fewer than {FEW_MEASURED} measured pixels": lambda row: float(row["measured_px"]) < FEW_MEASURED,
-    f"from nearer than {NEARBY_M:.0f} m": lambda row: float(row["distance_m"]) < NEARBY_M,
-}
-STUDIES = ("mixture-points", "transfer", "augmentation")  # shown below, once they are published
-ANGLES = "transfer/mixture/angles"
+from ..definition import read_definition
+from ..paths import TITLES
+from ..published import comparison, study
+from .cases import MIXTURE_CASES, accuracy_by_case
+from .results import case_columns, method_column, points_table
+from .targets import MIXTURE, targets_table
 
 
-def write_worlds_page(results_folder: Path, reports_folder: Path, page: Path) -> None:
-    """Render the page once the mixture is published.
-
-    Args:
-        results_folder: holds a folder for each published experiment and each data set, rows alone.
-        reports_folder: holds `<experiment>/report` of each, made before.
-        page: where to.
-    """
-    mixture = results_folder / MIXTURE
-    if not mixture.is_dir() or not whole_folds(mixture):
-        return
-    published = {
-        where: _open(results_folder / where, results_folder)
-        for where in (MIXTURE, ANGLES, CLUTTER, AT_4096)
-        if (results_folder / where).is_dir()
-    }
-    results, dataset = published[MIXTURE]
-    tables = {
-        name: {
-            path.stem: path.read_text(encoding="utf-8").strip()
-            for path in (reports_folder / name / "report" / "tables").glob("*.md")
-        }
-        for name in (MIXTURE, *STUDIES)
-    }
-    rules = results.comparison.rules
-    networks = tuple(method for method in results.networks if method not in rules)
-    rows = {row["sample_id"]: row for row in dataset.rows}
-    cases = cases_table(results, rows, results.networks, CASES)
-    render(
-        "generalization.md.j2",
-        page,
-        results=results,
-        targets=targets_table(published, networks).to_markdown().strip(),
-        mixture=MIXTURE,
-        tables=tables,
-        by_angle=_by_factor(published.get(ANGLES), ANGLE),
-        by_occlusion=_by_factor(published.get(CLUTTER), OCCLUSION),
-        trained=max(int(run.metric("train_samples")) for run in results.runs if run.network in networks),
-        cases=cases.to_markdown().strip() if rules else "",
-        rules=rules,
-        untrained=[
-            title for name, title in NAMES.items() if name in list_networks() and name not in networks
-        ],
-        lost=_lost(cases, rules),
-        waiting=[NAMES[name] for name in networks if not _epochs(mixture, name)],
-    )
-
-
-def _epochs(comparison: Path, network: str) -> int:
-    """Of training, 0 where weights that were there before are tested; at least one where nobody says."""
-    recipes = read_json(comparison / "comparison.json").get("recipe", {})
-    return int(recipes.get(network, {}).get("epochs", 1))
-
-
-def _open(comparison: Path, results_folder: Path) -> Published:
-    folder = rows_of(comparison, results_folder)
-    return Published(load_results(comparison, folder), open_dataset(folder))
-
-
-def _by_factor(published: Published | None, factor: str) -> str:
-    """Accuracy of every method by a factor, of test clouds made for it, as Markdown; "" until that is published."""
-    if published is None:
-        return ""
-    results, dataset = published
-    bins = [each for each in factor_bins(results, dataset) if each.factor == factor]
-    accuracy = {(each.method, each.low): number(each.right / each.samples) for each in bins}
-    first = [each for each in bins if each.method == results.networks[0]]
-    rows = tuple(
-        (
-            f"{each.low:g} to {each.high:g}",
-            str(each.samples),
-            *(accuracy[method, each.low] for method in results.networks),
-        )
-        for each in first
-    )
-    columns = (factor, "samples", *(NAMES.get(method, method) for method in results.networks))
-    return Table(f"Accuracy by {factor}", columns, rows).to_markdown().strip()
-
-
-def _lost(cases: Table, rules: Sequence[str]) -> list[str]:
-    """Cases in which some rule is right more often than every network."""
-    shares = [dict(zip(cases.columns, row, strict=True)) for row in cases.rows]
-    methods = cases.columns[2:]
-    return [
-        row["samples"]
-        for row in shares
-        if rules
-        and max(float(row[method]) for method in methods if method in rules)
-        > max(float(row[method]) for method in methods if method not in rules)
+def content() -> Mapping[str, Any]:
+    """Return the values of the page."""
+    results = comparison(MIXTURE)
+    transfer = study("transfer")
+    cases = accuracy_by_case(results, results.methods, MIXTURE_CASES)
+    untrained = [
+        TITLES[name] for name in results.networks if not results.config.recipe[name].get("epochs", 1)
     ]
+    undecidable = decidable_accuracy(results).set_index("method")
+    return {
+        "trained": max(int(run.metric("train_samples")) for run in results.runs if len(run.log)),
+        "untrained": untrained,
+        "targets": targets_table(results.networks).to_markdown(),
+        "summary": summary_table(results).to_markdown(),
+        "undecidable": undecidable.loc["pointnet2"],
+        "heads": heads_table(results).to_markdown(),
+        "presence": presence_table(results).to_markdown(),
+        "rules": results.rules,
+        "cases": Table.from_frame(
+            "Accuracy by case", cases, case_columns(results.methods), "An abstention counts as wrong."
+        ).to_markdown(),
+        "rule_ahead": list(
+            cases.loc[
+                cases[list(results.rules)].max(axis=1) > cases[list(results.networks)].max(axis=1), "case"
+            ]
+        ),
+        "points": points_table(study("mixture-points")).to_markdown(),
+        "transfer": transfer_table("transfer").to_markdown(),
+        "by_angle": factor_table(transfer.parts["mixture/angles"], ANGLE).to_markdown(),
+        "by_occlusion": factor_table(transfer.parts["mixture/cluttered"], OCCLUSION).to_markdown(),
+        "augmentation": transfer_table("augmentation").to_markdown(),
+    }
+
+
+def summary_table(results: Results) -> Table:
+    """Build the headline table: states of doors, and states or no door."""
+    four = score_four_labels(results).set_index("method")
+    frame = summarize_methods(results).join(four[["no_door", "mean"]], on="method")
+    columns = (
+        method_column("method"),
+        count_column("errors"),
+        number_column("f1", "macro F1"),
+        interval_column("f1", "95 %"),
+        number_column("mean", "mean recall, four labels"),
+        number_column("no_door", "recall of no door"),
+    )
+    note = (
+        f"{frame['samples'].iloc[0]} doors. Four labels: the three states and no door, on all samples; a state counts "
+        "if a door is likelier than none."
+    )
+    return Table.from_frame("Scores on scenes never seen", frame, columns, note)
+
+
+def heads_table(results: Results) -> Table:
+    """Build the short table of errors of the other heads."""
+    columns = (
+        method_column(),
+        number_column("door_auroc", "door, AUROC"),
+        number_column("angle_error_semi_open_deg", "opening angle, semi-open, °", 1),
+        number_column("hinge_accuracy", "hinge side correct", 3),
+        number_column("frame_position_error_median_m", "frame position, m", 3),
+        number_column("frame_yaw_error_median_deg", "yaw, °", 1),
+        number_column("passable_width_error_m", "passable width, m", 3),
+    )
+    note = "Angle and width: mean error. Position and yaw: median error."
+    return Table.from_frame("Outputs besides the state", score_heads(results), columns, note)
+
+
+def presence_table(results: Results) -> Table:
+    """Build the table of scenes without a door that are taken for one, by kind."""
+    frame = score_presence(results)
+    without = frame[~frame["door"].astype(bool)]
+    wide = without.pivot(index="kind", columns="method", values="share").reset_index()
+    samples = without.drop_duplicates("kind").set_index("kind")["samples"]
+    wide = wide.assign(samples=wide["kind"].map(samples), kind=wide["kind"].str.replace("_", " "))
+    networks = [name for name in results.networks if name in wide]
+    columns = (
+        label_column("kind", "scene"),
+        count_column("samples"),
+        *(number_column(name, TITLES[name], 2) for name in networks),
+    )
+    return Table.from_frame("Share of scenes without a door that are taken for one", wide, columns)
+
+
+def transfer_table(name: str) -> Table:
+    """Build the table of macro F1 by training and test set of a transfer study of one network."""
+    content = read_definition(name).content
+    scores = score_transfer(study(name), list(content["trained"]), list(content["tested"]))
+    columns = (
+        label_column("trained", "trained on"),
+        *(number_column(tested, tested, 3) for tested in content["tested"]),
+    )
+    return Table.from_frame("Macro F1 by training and test set", transfer_grid(scores), columns)
+
+
+def factor_table(results: Results, factor: str) -> Table:
+    """Build the table of accuracy by one factor, a column for each bin."""
+    bins = score_factors(results)
+    bins = bins[bins["factor"] == factor]
+    titles = tuple(f"{low:g}–{high:g}" for low, high in zip(bins["low"], bins["high"], strict=True))
+    rows = (
+        ("samples", *map(str, bins["samples"])),
+        ("accuracy", *(number(value, 2) for value in bins["accuracy"])),
+    )
+    return Table(f"Accuracy by {factor}", (factor, *titles), rows)

@@ -1,54 +1,54 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where a protocol asks for more than what lies between learned places: tested samples by what is learned around."""
+"""Tested samples by the places trained around them: between two trained directions, or beyond them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
+import pandas as pd
 
-from doorstate.evaluation.results import ComparisonResults
+from doorstate.evaluation.comparison import Results
 
-Row = Mapping[str, str]
-_SIDE_M = 0.25  # learned places so much nearer or farther from the door count as beside a tested one
-_MIDDLE_M = 2.5  # of the half-ring, 1.5 to 3.5 m
+from .cases import Case
+
+RING_M = 0.25  # trained places within this distance from that of a tested one count as beside it
+MIDDLE_M = 2.5  # of the half-ring, 1.5 to 3.5 m
 
 
-def places_cases(results: ComparisonResults, rows: Mapping[str, Row]) -> dict[str, Callable[[Row], bool]]:
-    """Cases for `cases_table`: with learned places on both sides along the half-ring, or on one side alone.
+def place_cases(results: Results) -> Mapping[str, Case]:
+    """Return cases for `accuracy_by_case`: between or beyond trained directions, near or far.
 
     Args:
-        results: every sample is tested by one fold at most.
-        rows: of the manifest, by sample.
+        results: every sample is tested in at most one fold.
     """
-    between = {sample for fold in range(len(results.splits)) for sample in _between(results, rows, fold)}
+    inside = samples_between(results)
 
-    def case(inside: bool, near: bool) -> Callable[[Row], bool]:
-        return lambda row: (
-            (row["sample_id"] in between) is inside and (float(row["distance_m"]) < _MIDDLE_M) is near
-        )
+    def case(is_between: bool, is_near: bool) -> Case:
+        def belongs(rows: pd.DataFrame) -> pd.Series[bool]:
+            between, near = rows["sample_id"].isin(inside), rows["distance_m"] < MIDDLE_M
+            return (between == is_between) & (near == is_near)
+
+        return belongs
 
     return {
-        f"{words}, {side} {_MIDDLE_M:g} m": case(inside, near)
-        for inside, words in ((True, "between learned directions"), (False, "beyond them"))
-        for near, side in ((True, "nearer than"), (False, "from"))
+        f"{words}, {side} {MIDDLE_M:g} m": case(is_between, is_near)
+        for is_between, words in ((True, "between trained directions"), (False, "beyond them"))
+        for is_near, side in ((True, "nearer than"), (False, "from"))
     }
 
 
-def _between(results: ComparisonResults, rows: Mapping[str, Row], fold: int) -> list[str]:
-    learned = np.array(
-        [_place(rows[sample]) for sample, role in results.splits[fold].items() if role == "train"]
-    )
-    found = []
-    for sample, role in results.splits[fold].items():
-        if role != "test":
-            continue
-        bearing_deg, distance_m = _place(rows[sample])
-        beside = learned[np.abs(learned[:, 1] - distance_m) <= _SIDE_M, 0]
-        if (beside < bearing_deg).any() and (beside > bearing_deg).any():
-            found.append(sample)
+def samples_between(results: Results) -> set[str]:
+    """Return the tested samples with trained ones on both sides along the half-ring, at about the same distance."""
+    places = results.manifest[["robot_angle_deg", "distance_m"]]
+    found: set[str] = set()
+    for roles in results.splits:
+        role = pd.Series(roles, dtype="str").reindex(places.index)
+        trained = places[role == "train"].to_numpy()
+        for sample, (bearing_deg, distance_m) in zip(
+            places.index[role == "test"], places[role == "test"].to_numpy(), strict=True
+        ):
+            beside = trained[np.abs(trained[:, 1] - distance_m) <= RING_M, 0]
+            if (beside < bearing_deg).any() and (beside > bearing_deg).any():
+                found.add(str(sample))
     return found
-
-
-def _place(row: Row) -> np.ndarray:
-    return np.array([float(row["robot_angle_deg"]), float(row["distance_m"])])

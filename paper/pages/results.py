@@ -1,325 +1,209 @@
 # SPDX-License-Identifier: Apache-2.0
-"""docs/results.md and docs/related.md from the committed predictions: words are in the .j2, figures are computed."""
+"""Values of docs/results.md: the paper's comparison, unseen poses, the authors' recipes, points and cost."""
 
 from __future__ import annotations
 
-import json
-import re
-from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import Path
+import math
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
+import pandas as pd
+from doorstate.evaluation.method_scores import MACRO, score_states, summarize_methods
 
-from doorstate._files import write_text
-from doorstate.clouds.preparation import NUM_POINTS
-from doorstate.dataset.store import open_dataset
-from doorstate.evaluation.join import load_joined
-from doorstate.evaluation.metrics import Scores, scores
-from doorstate.evaluation.resolution import load_resolution, resolution_table
-from doorstate.evaluation.results import ComparisonResults
-from doorstate.evaluation.score_tables import pooled_confusion
-from doorstate.evaluation.table import UNDEFINED, Table, number
+from doorstate.evaluation.calibration import score_calibration
+from doorstate.evaluation.comparison import Results
+from doorstate.evaluation.resolution import score_resolution
+from doorstate.evaluation.study import Study
+from doorstate.evaluation.table import (
+    Column,
+    Table,
+    count_column,
+    deviation_column,
+    interval_column,
+    label_column,
+    number,
+    number_column,
+)
 from doorstate.training.recipes import AUTHORS
-from doorstate.training.run_folder import read_json, run_of
-from doorstate.types import STATES
 
-from ..publish import rows_of
-from .pairwise import NEARBY_M, cases_table, duels_table, near_the_border, never_seen_table
-from .places import places_cases
-from .templates import template
+from ..paths import TITLES
+from ..published import comparison, study
+from .cases import accuracy_by_case, count_error_kinds
+from .places import place_cases
 
-# What the page is about, or costs beside it.
-SHOWN = ("paper", "by-pose", "by-pose-mirrored", "authors", "related")
-ASKED = 0.995  # macro-F1 that every network should reach
-ASKED_NEVER_SEEN = 0.99  # that the best should reach on poses never seen
-BENCHMARK = Path(__file__).resolve().parents[2] / "docs" / "benchmarks" / "networks.json"
-NAMES = {
-    "pointnet": "PointNet",
-    "pointnet2": "PointNet++",
-    "dgcnn": "DGCNN",
-    "pointcnn": "PointCNN",
-    "point2sequence": "Point2Sequence",
-    "mvcnn": "MVCNN",
-    "open_door": "open-door rule",
-    "plane_state": "plane state",
-    "wall_leaf_angle": "wall and leaf",
-    "angle_bins": "angle bins",
-    "depth_region": "depth region",
-}
+TARGET_F1, TARGET_UNSEEN_F1 = 0.995, 0.99  # of every network; of the best one on unseen poses
+EXPERIMENTS = ("paper", "by-pose", "by-pose-mirrored", "authors", "related")
 
 
-@dataclass(frozen=True)
-class Published:
-    """One comparison as the page speaks of it."""
-
-    results: ComparisonResults
-    rows: dict[str, dict[str, str]]  # of the manifest, by sample
-    tables: dict[str, str]  # Markdown, by name
-    scores: dict[str, Scores]  # pooled, by network
-    confusion: dict[str, np.ndarray]
-
-    def macro_f1(self, network: str) -> float:
-        return float(self.scores[network].macro.f1)
-
-    def errors(self, network: str) -> int:
-        """Test samples that a network got wrong."""
-        counts = self.confusion[network]
-        return int(counts.sum() - np.trace(counts))
-
-    def silent(self, method: str) -> int:
-        """Test samples to which a method gave no answer."""
-        return int(self.confusion[method][:, len(STATES) :].sum())
-
-    def best(self) -> str:
-        """Name of the network with the largest macro-F1."""
-        return max(self.results.networks, key=self.macro_f1)
-
-    def below(self, bound: float) -> list[str]:
-        """Networks whose pooled macro-F1 is below a bound."""
-        return [name for name in self.results.networks if self.macro_f1(name) < bound]
-
-    def least(self) -> float:
-        """Lowest of all precisions, recalls and F1 of all networks and states."""
-        return min(float(np.min([s.precision, s.recall, s.f1])) for s in self.scores.values())
-
-    def least_validation(self) -> float:
-        """Lowest macro-F1 of all runs on their validation samples."""
-        return min(run.metric("val_macro_f1") for run in self.results.runs)
-
-    def lowest_recall(self, state: str) -> tuple[list[str], float]:
-        """Networks with the lowest recall of a state, several where they are equal, and that recall."""
-        index = STATES.index(state)
-        recalls = {name: float(self.scores[name].recall[index]) for name in self.results.networks}
-        least = min(recalls.values())
-        return [name for name, recall in recalls.items() if recall == least], least
-
-    def kinds_of_errors(self) -> tuple[int, int, int]:
-        """Errors of all networks; those whose opening is near the other state's; of the rest those taken nearby."""
-        errors = [self.rows[error.sample_id] for error in self.results.error_rows]
-        far = [row for row in errors if not near_the_border(row)]
-        nearby = sum(float(row["distance_m"]) < NEARBY_M for row in far)
-        return len(errors), len(errors) - len(far), nearby
-
-    def hits(self, network: str, state: str) -> tuple[int, int]:
-        """Recognised samples of a state, and all of them."""
-        row = self.confusion[network][STATES.index(state)]
-        return int(row[STATES.index(state)]), int(row.sum())
+def method_column(title: str = "network") -> Column:
+    """Return the column of methods by their titles; rules keep their names, as code."""
+    return Column(title, ("method",), lambda name: TITLES.get(name, f"`{name}`"), is_label=True)
 
 
-def write_pages(results_folder: Path, reports_folder: Path, results_page: Path, related_page: Path) -> None:
-    """Render both pages; that of the related work once it is published beside the paper's networks.
-
-    Args:
-        results_folder: holds one folder for each published experiment, and one for each data set, rows alone.
-        reports_folder: holds `<experiment>/report` of each complete one, made before.
-        results_page: of the five networks.
-        related_page: of the methods beside them.
-    """
-    found = [path.parent for path in sorted(results_folder.glob("*/comparison.json"))]
-    folders = [folder for folder in found if folder.name in SHOWN]
-    waiting = {folder.name: unfinished_runs(folder) for folder in folders}
-    published = {
-        folder.name: _published([folder], reports_folder) for folder in folders if whole_folds(folder)
-    }
-    resolution = results_folder / "resolution"
-    render(
-        "results.md.j2",
-        results_page,
-        published=published,
-        waiting={name: runs for name, runs in waiting.items() if runs},
-        budget=_table(budget_table(list(published.values()))),
-        gap=_both(published, "by-pose", gap_table),
-        places=_table(places_table(published["by-pose"])) if "by-pose" in published else None,
-        cuts=_both(published, "authors", lambda paper, authors: cuts_table(authors, paper)),
-        asked=ASKED,
-        asked_never_seen=ASKED_NEVER_SEEN,
-        resolution=_table(
-            resolution_table(load_resolution(resolution, rows_of(results_folder / "paper", results_folder)))
-        )
-        if resolution.is_dir()
-        else None,
-    )
-    if "paper" in published and "related" in published:
-        both = [results_folder / name for name in ("paper", "related")]
-        every = _published(both, reports_folder)
-        render("related.md.j2", related_page, all=every, **_duels(every, published.get("by-pose")))
-
-
-def _duels(every: Published, by_pose: Published | None) -> dict[str, Any]:
-    """Rules that tell all three states against networks; nothing where there are none."""
-    networks = every.results.comparison.networks
-    rules = [name for name in every.results.comparison.rules if every.hits(name, "semi_open")[0]]
-    if not rules:
-        return {"best_rule": None}
-    best_rule = max(rules, key=every.macro_f1)
+def content() -> Mapping[str, Any]:
+    """Return the values of the page."""
+    paper, by_pose, mirrored = (comparison(name) for name in ("paper", "by-pose", "by-pose-mirrored"))
+    summaries = {name: summary(comparison(name)) for name in ("paper", "by-pose", "by-pose-mirrored")}
+    states = score_states(paper)
+    scores = states[states["state"] != MACRO][["precision", "recall", "f1"]]
+    best = {name: frame.sort_values("f1").iloc[-1] for name, frame in summaries.items()}
     return {
-        "best_network": max(networks, key=every.macro_f1),
-        "best_rule": best_rule,
-        "beaten": [name for name in networks if every.macro_f1(name) < every.macro_f1(best_rule)],
-        "duels": _table(duels_table(every.results, rules, networks)),
-        "cases": _table(cases_table(every.results, every.rows, (*rules, *networks))),
-        "never_seen": _table(never_seen_table(every.results, by_pose.results, rules)) if by_pose else None,
+        "best": best,
+        "below": [TITLES[name] for name in summaries["paper"].query("f1 < @TARGET_F1")["method"]],
+        "target": TARGET_F1,
+        "target_unseen": TARGET_UNSEEN_F1,
+        "lowest": float(scores.min().min()),
+        "lowest_recall": {state: _lowest_recall(states, state) for state in ("open", "semi_open")},
+        "hits": _hits(paper, "pointnet2", "open"),
+        "errors": {name: count_error_kinds(comparison(name)) for name in ("paper", "by-pose")},
+        "least_validation": min(run.metric("val_macro_f1") for run in by_pose.runs),
+        "summary": summary_table(paper).to_markdown(),
+        "calibration": calibration_table(paper).to_markdown(),
+        "protocols": protocols_table(summaries).to_markdown(),
+        "places": places_table(by_pose).to_markdown(),
+        "authors": authors_table(comparison("authors"), paper).to_markdown(),
+        "points": points_table(study("resolution")).to_markdown(),
+        "cost": cost_table([comparison(name) for name in EXPERIMENTS]).to_markdown(),
+        "mirrored_folds": mirrored.config.folds,
     }
 
 
-def _both(
-    published: Mapping[str, Published], name: str, make: Callable[[Published, Published], Table]
-) -> str | None:
-    """A table of the paper's protocol and another experiment, once both are there."""
-    if not {"paper", name} <= set(published):
-        return None
-    return _table(make(published["paper"], published[name]))
+def summary(results: Results) -> pd.DataFrame:
+    """Return `summarize_methods` with the recall of each state."""
+    recall = score_states(results).pivot(index="method", columns="state", values="recall")
+    return summarize_methods(results).join(recall.add_prefix("recall_"), on="method")
 
 
-def render(name: str, page: Path, **content: Any) -> None:
-    text = template(name).render(
-        **content,
-        names=NAMES,
-        states=STATES,
-        percent=lambda value, digits=2: f"{100 * value:.{digits}f} %",
-    )
-    write_text(page, re.sub(r"\n{3,}", "\n\n", text).strip() + "\n")
-
-
-def unfinished_runs(folder: Path) -> list[str]:
-    """Runs of a published comparison that are not there yet, as `network fold k`."""
-    return [
-        f"{method} fold {fold}" for method, fold in _runs(folder) if not run_of(folder, method, fold).finished
-    ]
-
-
-def whole_folds(folder: Path) -> int:
-    """How many folds, from the first on, all methods of a published comparison have finished: these are shown."""
-    missing = [fold for method, fold in _runs(folder) if not run_of(folder, method, fold).finished]
-    folds: int = read_json(folder / "comparison.json")["folds"]
-    return min(missing, default=folds)
-
-
-def _runs(folder: Path) -> list[tuple[str, int]]:
-    asked = read_json(folder / "comparison.json")
-    methods = (*asked["networks"], *asked.get("rules", ()))
-    return [(method, fold) for fold in range(asked["folds"]) for method in methods]
-
-
-def budget_table(published: list[Published]) -> Table:
-    """What every network cost, and what the same epochs at all points would cost with a public port."""
-    port_ms = _port_milliseconds()
-    rows = []
-    total_hours = 0.0
-    for each in published:
-        # Ports were timed at 4096 points.
-        at_all_points = each.results.comparison.num_points == NUM_POINTS
-        costs = defaultdict(list)
-        for run in each.results.runs:
-            epochs = len(run.log["epoch"]) if run.log else 0
-            threads = int(run.environment.get("threads", 1))
-            clouds = epochs * run.metric("train_samples")
-            costs[run.network].append((run.metric("seconds"), threads, epochs, clouds))
-        for network, runs in costs.items():
-            if not any(epochs for _, _, epochs, _ in runs):
-                continue  # a rule learns nothing
-            seconds, threads, epochs, clouds = (sum(column) for column in zip(*runs, strict=True))
-            port = clouds * port_ms[network] / 3.6e6 if network in port_ms and at_all_points else float("nan")
-            core_hours = sum(run[0] * run[1] for run in runs) / 3600
-            rows.append(
-                (
-                    each.results.comparison.name,
-                    network,
-                    str(len(runs)),
-                    number(epochs / len(runs), 0),
-                    number(seconds / len(runs) / 60, 0),
-                    number(core_hours, 1),
-                    number(2 * port, 0),
-                )
-            )
-            total_hours += core_hours
-    if rows:
-        rows.append(("all", *[""] * 4, number(total_hours, 1), ""))
-    columns = ("experiment", "network", "runs", "epochs", "minutes a run", "core hours", "core hours, port")
-    note = (
-        "Port: the same number of epochs at 4096 points with the public port, from its measured training step "
-        f"(docs/benchmarks/networks.md, two cores). {UNDEFINED}: no port was measured at these "
-        "points. Runs were trained two at a time, mostly beside other work: alone they take less."
-    )
-    return Table("What the runs cost", columns, tuple(rows), note, text_columns=2)
-
-
-def gap_table(paper: Published, other: Published) -> Table:
-    """Macro-F1 and errors of every network under two protocols."""
-    rows = tuple(
-        (
-            network,
-            number(paper.macro_f1(network)),
-            number(other.macro_f1(network)),
-            number(other.macro_f1(network) - paper.macro_f1(network)),
-            f"{paper.errors(network)} of {int(paper.confusion[network].sum())}",
-            f"{other.errors(network)} of {int(other.confusion[network].sum())}",
-        )
-        for network in other.results.networks
-        if network in paper.results.networks
-    )
-    names = [each.results.comparison.name for each in (paper, other)]
+def summary_table(results: Results) -> Table:
+    """Build the headline table of a comparison."""
+    frame = summary(results)
     columns = (
-        "network",
-        *(f"macro F1, {name}" for name in names),
-        "difference",
-        *(f"errors, {name}" for name in names),
+        method_column("method" if results.rules else "network"),
+        count_column("errors"),
+        number_column("f1", "macro F1"),
+        interval_column("f1", "95 %"),
+        deviation_column("f1", "over folds"),
+        *(number_column(f"recall_{state}", f"recall {title}") for state, title in _STATES.items()),
     )
-    return Table("The same recipe under both protocols", columns, rows)
+    note = (
+        f"{frame['samples'].iloc[0]} test samples, pooled over {results.config.folds} folds. 95 %: bootstrap over "
+        "poses. Over folds: mean and standard deviation."
+    )
+    return Table.from_frame("Scores", frame, columns, note)
 
 
-def places_table(by_pose: Published) -> Table:
-    """Accuracy of every network by what was learned around the tested place."""
-    cases = places_cases(by_pose.results, by_pose.rows)
-    return cases_table(by_pose.results, by_pose.rows, by_pose.results.networks, cases)
+_STATES = {"closed": "closed", "semi_open": "semi-open", "open": "open"}
 
 
-def cuts_table(authors: Published, common: Published) -> Table:
-    """What the authors' recipes were cut to, and the common recipe on the same fold."""
+def calibration_table(results: Results) -> Table:
+    """Build the short table of calibration errors."""
+    columns = (
+        method_column(),
+        deviation_column("temperature", "temperature", 3),
+        number_column("ece_raw", "calibration error, raw"),
+        number_column("ece_scaled", "scaled"),
+    )
+    return Table.from_frame("Expected calibration error", score_calibration(results), columns)
+
+
+def protocols_table(summaries: Mapping[str, pd.DataFrame]) -> Table:
+    """Build the table of macro F1 and errors of each network under both protocols."""
+    paper, by_pose, mirrored = (
+        summaries[name].set_index("method")[["f1", "errors"]]
+        for name in ("paper", "by-pose", "by-pose-mirrored")
+    )
+    frame = paper.join(by_pose, lsuffix="_paper", rsuffix="_unseen").join(mirrored.add_suffix("_mirrored"))
+    columns = (
+        method_column(),
+        number_column("f1_paper", "macro F1, paper"),
+        number_column("f1_unseen", "macro F1, by-pose"),
+        number_column("f1_mirrored", "by-pose, mirrored"),
+        count_column("errors_paper", "errors, paper"),
+        count_column("errors_unseen", "errors, by-pose"),
+        count_column("errors_mirrored", "by-pose, mirrored"),
+    )
+    return Table.from_frame("One recipe, two protocols", frame.reset_index(), columns)
+
+
+def places_table(by_pose: Results) -> Table:
+    """Build the table of accuracy by the places trained around the tested one."""
+    frame = accuracy_by_case(by_pose, by_pose.networks, place_cases(by_pose))
+    return Table.from_frame("Accuracy by place", frame, case_columns(by_pose.networks))
+
+
+def case_columns(methods: Sequence[str]) -> tuple[Column, ...]:
+    """Return the columns of `accuracy_by_case`."""
+    titles = (TITLES.get(method, f"`{method}`") for method in methods)
+    return (
+        label_column("case", "samples"),
+        count_column("samples", "number"),
+        *(number_column(method, title, 3) for method, title in zip(methods, titles, strict=True)),
+    )
+
+
+def authors_table(authors: Results, common: Results) -> Table:
+    """Build the table of the authors' shortened recipes beside the common one, on the same fold."""
+    scores = {(run.method, run.fold): run.metric("test_macro_f1") for run in common.runs}
+    rows = [
+        {
+            "method": run.method,
+            "epochs": f"{len(run.log)} of {AUTHORS[run.method].epochs}",
+            "authors": run.metric("test_macro_f1"),
+            "common": scores[run.method, run.fold],
+        }
+        for run in authors.runs
+    ]
+    columns = (
+        method_column(),
+        Column("epochs", ("epochs",), str),
+        number_column("authors", "macro F1, authors' recipe"),
+        number_column("common", "macro F1, common recipe"),
+    )
+    return Table.from_frame("Recipes of the authors", pd.DataFrame(rows), columns)
+
+
+def points_table(resolution: Study) -> Table:
+    """Build the table of macro F1 by number of points, as trained and fine-tuned, and of two latencies."""
+    scores = score_resolution(resolution)
+    counts = sorted(scores["points"].unique())
+    wide = scores.pivot(index="method", columns="points").loc[list(dict.fromkeys(scores["method"]))]
+    wide.columns = pd.Index(["-".join(map(str, column)) for column in wide.columns.to_flat_index()])
+    columns = (
+        method_column(),
+        *(Column(f"{points}", (f"as_trained-{points}", f"fine_tuned-{points}"), _pair) for points in counts),
+        *(number_column(f"milliseconds-{points}", f"ms, {points}", 1) for points in (1024, 4096)),
+    )
+    return Table.from_frame("Macro F1 by number of points", wide.reset_index(), columns)
+
+
+def _pair(as_trained: float, fine_tuned: float) -> str:
+    return number(as_trained, 3) + ("" if math.isnan(fine_tuned) else f" / {number(fine_tuned, 3)}")
+
+
+def cost_table(comparisons: Sequence[Results]) -> Table:
+    """Build the table of core hours of each experiment."""
     rows = []
-    for run in authors.results.runs:
-        full = AUTHORS[run.network].epochs
-        same = next((r for r in common.results.runs if (r.network, r.fold) == (run.network, run.fold)), None)
-        rows.append(
-            (
-                run.network,
-                str(run.fold),
-                f"{len(run.log['epoch'])} of {full}" if run.log else UNDEFINED,
-                number(run.metric("test_macro_f1")),
-                UNDEFINED if same is None else number(same.metric("test_macro_f1")),
-            )
-        )
-    columns = ("network", "fold", "epochs", "macro F1, authors' recipe", "macro F1, common recipe")
-    return Table("The authors' recipes beside the common one", columns, tuple(rows))
-
-
-def _published(folders: Sequence[Path], reports_folder: Path) -> Published:
-    rows_folder = rows_of(folders[0], folders[0].parent)
-    results = load_joined(folders, rows_folder, min(whole_folds(folder) for folder in folders))
-    tables = reports_folder / folders[-1].name / "report" / "tables"
-    confusion = {network: pooled_confusion(results, network) for network in results.networks}
-    return Published(
-        results,
-        {row["sample_id"]: row for row in open_dataset(rows_folder).rows},
-        {path.stem: path.read_text(encoding="utf-8").strip() for path in tables.glob("*.md")},
-        {network: scores(counts) for network, counts in confusion.items()},
-        confusion,
+    for results in comparisons:
+        trained = [run for run in results.runs if len(run.log)]
+        hours = sum(run.metric("seconds") * int(run.environment.get("threads", 1)) for run in trained) / 3600
+        rows.append({"experiment": results.config.name, "runs": len(trained), "hours": hours})
+    frame = pd.DataFrame(rows)
+    total = {"experiment": "all", "runs": frame["runs"].sum(), "hours": frame["hours"].sum()}
+    frame = pd.concat([frame, pd.DataFrame([total])], ignore_index=True)
+    columns = (
+        label_column("experiment"),
+        count_column("runs", "trained runs"),
+        number_column("hours", "core hours", 1),
     )
+    return Table.from_frame("Training cost", frame, columns)
 
 
-def _port_milliseconds() -> dict[str, float]:
-    groups = json.loads(BENCHMARK.read_text(encoding="utf-8"))["groups"].values()
-    return {
-        group["network"]: row["train_ms"]
-        for group in groups
-        if group["points"] == 4096
-        for row in group["rows"]
-        if row["form"] == "port"
-    }
+def _lowest_recall(states: pd.DataFrame, state: str) -> tuple[list[str], float]:
+    recall = states[states["state"] == state].set_index("method")["recall"]
+    return list(recall.index[recall == recall.min()]), float(recall.min())
 
 
-def _table(table: Table) -> str:
-    return table.to_markdown().strip()
+def _hits(results: Results, method: str, state: str) -> tuple[int, int]:
+    tested = results.tested_by(method)
+    correct = tested.loc[tested["state"] == state, "correct"]
+    return int(correct.sum()), len(correct)

@@ -1,243 +1,248 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What was asked of the mixture's weights, and what each network reaches: the first table of docs/generalization.md."""
+"""Targets for the weights of the mixture, and the figures that networks reach."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple
 
-import numpy as np
+import pandas as pd
+from doorstate.evaluation.heads import head_errors, head_rows
+from doorstate.evaluation.undecidable import is_undecidable
 
-from doorstate.dataset.store import PreparedDataset
 from doorstate.evaluation.calibration import calibrate, reliability
-from doorstate.evaluation.head_tables import answer_errors
-from doorstate.evaluation.metrics import confusion_matrix, scores
-from doorstate.evaluation.results import ComparisonResults
-from doorstate.evaluation.stratum_tables import is_undecidable
-from doorstate.evaluation.stratum_tables import rows_of as manifest_of
-from doorstate.evaluation.table import Table, number
+from doorstate.evaluation.comparison import Results
+from doorstate.evaluation.metrics import macro_f1
+from doorstate.evaluation.table import Column, Table, label_column, number
 from doorstate.types import NO_DOOR
 
-from .results import NAMES
+from ..paths import TITLES
+from ..published import comparison, study
+from .cases import Case
 
-MIXTURE = "mixture-wide"  # the comparison of the page
-AT_4096 = "mixture-points/as-trained-4096"
-CLUTTER = "transfer/mixture/cluttered"
-_95 = 1.96  # standard errors to either side
-
-Row = Mapping[str, str]
+MIXTURE = "mixture-wide"
+_Z95 = 1.96  # standard errors to either side of a 95 % interval
 
 
-class Published(NamedTuple):
-    """A published comparison, and the rows of what it tested."""
-
-    results: ComparisonResults
-    dataset: PreparedDataset
-
-
-class Found(NamedTuple):
-    """How well a network does; the margin is half of an interval of 95 %, where so few samples are told apart."""
+@dataclass(frozen=True)
+class Measured:
+    """Figure of a network, and half of its 95 % interval where samples are few."""
 
     value: float = math.nan
     margin: float = 0.0
 
 
-class Target(NamedTuple):
-    """Something that was asked for, of which samples, and how well a network does at it."""
+def _mixture() -> Results:
+    return comparison(MIXTURE)
 
-    words: str
-    bound: float
-    more_is_better: bool
-    digits: int
+
+@dataclass(frozen=True)
+class Target:
+    """Bound for a metric on some samples.
+
+    Attributes:
+        title: metric and unit.
+        samples: samples in words.
+        bound: least value, or greatest if `at_most`.
+        chosen: rows of `Results.frame` that count.
+        measure: of a network on these rows.
+        results: comparison that holds them.
+    """
+
+    title: str
     samples: str
-    is_one: Callable[[Row], bool]  # of a row of the manifest
-    found: Callable[[Published, str], Found]
-    where: str = MIXTURE  # published comparison that tells
+    bound: float
+    chosen: Case
+    measure: Callable[[Results, str, Case], Measured]
+    at_most: bool = False
+    digits: int = 1
+    results: Callable[[], Results] = _mixture
 
-    def reached(self, found: Found) -> bool:
-        """Whether a figure is good enough; one that nobody knows is not."""
-        return bool(found.value >= self.bound if self.more_is_better else found.value <= self.bound)
+    def reached(self, measured: Measured) -> bool:
+        """Return whether a figure meets the bound; NaN does not."""
+        return measured.value <= self.bound if self.at_most else measured.value >= self.bound
 
-    def undecided(self, found: Found) -> bool:
-        """Whether the samples are too few to tell."""
-        return abs(found.value - self.bound) < found.margin
-
-
-def _noisy(row: Row) -> bool:
-    return row["sensor"] == "xtion" and row["pose_id"].startswith("varied-") and _is_door(row)
-
-
-def _noisy_decidable(row: Row) -> bool:
-    return _noisy(row) and not is_undecidable(row)
+    def undecided(self, measured: Measured) -> bool:
+        """Return whether the bound lies within the interval of a figure."""
+        return abs(measured.value - self.bound) < measured.margin
 
 
-def _is_door(row: Row) -> bool:
-    return row["state"] != NO_DOOR
+def _noisy(rows: pd.DataFrame) -> pd.Series[bool]:
+    return (rows["sensor"] == "xtion") & rows["pose_id"].str.startswith("varied-") & _is_door(rows)
 
 
-def _is_cluttered(row: Row) -> bool:
-    return row["pose_id"].startswith("cluttered-") and row["occluded_bin"] in ("0", "0-25")
+def _noisy_decidable(rows: pd.DataFrame) -> pd.Series[bool]:
+    return _noisy(rows) & ~is_undecidable(rows)
 
 
-def _macro_f1(is_one: Callable[[Row], bool], published: Published, network: str) -> Found:
-    results, dataset = published
-    pooled = results.pooled(network)
-    chosen = np.array([is_one(row) for row in manifest_of(dataset, pooled)])
-    if not chosen.any():
-        return Found()
-    return Found(float(scores(confusion_matrix(pooled.true[chosen], pooled.predicted[chosen])).macro.f1))
+def _any(rows: pd.DataFrame) -> pd.Series[bool]:
+    return rows["state"].notna()
 
 
-def _points_lost(published: Published, network: str) -> Found:
-    """By clutter that hides up to a quarter of a door, against none of it, in points of accuracy."""
-    results, dataset = published
-    pooled = results.pooled(network)
-    rows = manifest_of(dataset, pooled)
-    bins = np.array([row["occluded_bin"] if _is_cluttered(row) else "" for row in rows])
-    free, hidden = (pooled.right[bins == name] for name in ("0", "0-25"))
-    if not (len(free) and len(hidden)):
-        return Found()
-    margin = _95 * math.sqrt(free.var() / len(free) + hidden.var() / len(hidden))
-    return Found(100 * float(free.mean() - hidden.mean()), 100 * margin)
+def _is_door(rows: pd.DataFrame) -> pd.Series[bool]:
+    return rows["state"] != NO_DOOR
 
 
-def _calibration_error(published: Published, network: str) -> Found:
-    found = calibrate(published.results, network)
-    return Found() if found is None else Found(100 * reliability(found.true, found.scaled).error)
+def _cluttered(rows: pd.DataFrame) -> pd.Series[bool]:
+    return rows["pose_id"].str.startswith("cluttered-") & rows["occluded_bin"].isin(["0", "0-25"])
 
 
-def _head(name: str, factor: float = 1.0) -> Callable[[Published, str], Found]:
-    def found(published: Published, network: str) -> Found:
-        given = published.results.answers(network)
-        return Found() if given is None else Found(factor * answer_errors(given, published.dataset)[name])
-
-    return found
+def _has_hinge(rows: pd.DataFrame) -> pd.Series[bool]:
+    return rows["hinge"].fillna("") != ""
 
 
-_MACRO_F1 = "macro F1 of three states"
-_LOST = "points of accuracy lost where up to a quarter of the door is hidden"
+def _macro_f1(results: Results, network: str, chosen: Case) -> Measured:
+    tested = results.tested_by(network)
+    rows = tested[chosen(tested)]
+    return Measured(macro_f1(rows)) if len(rows) else Measured()
+
+
+def _accuracy_lost(results: Results, network: str, chosen: Case) -> Measured:
+    """Return how many points of accuracy doors lose that are hidden by up to a quarter."""
+    tested = results.tested_by(network)
+    rows = tested[chosen(tested)]
+    free, hidden = (rows.loc[rows["occluded_bin"] == name, "correct"].astype(float) for name in ("0", "0-25"))
+    if free.empty or hidden.empty:
+        return Measured()
+    margin = _Z95 * math.sqrt(free.var(ddof=0) / len(free) + hidden.var(ddof=0) / len(hidden))
+    return Measured(100 * (free.mean() - hidden.mean()), 100 * margin)
+
+
+def _calibration_error(results: Results, network: str, chosen: Case) -> Measured:
+    calibration = calibrate(results, network)
+    if calibration is None:
+        return Measured()
+    return Measured(100 * reliability(calibration.true, calibration.scaled).error)
+
+
+def _head(
+    name: str,
+    factor: float,
+    results: Results,
+    network: str,
+    chosen: Case,
+) -> Measured:
+    rows = head_rows(results, network)
+    return Measured() if rows is None else Measured(factor * head_errors(rows)[name])
+
+
+def _at_4096() -> Results:
+    return study("mixture-points").parts["as-trained-4096"]
+
+
+def _clutter() -> Results:
+    return study("transfer").parts["mixture/cluttered"]
+
+
+_POSITION = partial(_head, "frame_position_error_median_m", 100)
+_YAW = partial(_head, "frame_yaw_error_median_deg", 1)
+_F1, _LOST = "macro F1", "accuracy lost by a quarter hidden, points"
 TARGETS = (
     Target(
-        _MACRO_F1,
+        _F1,
+        "`varied` doors seen by an Xtion, 4096 points",
         0.97,
-        True,
-        4,
-        "doors of `varied`, Xtion, 4096 points",
         _noisy,
-        partial(_macro_f1, _noisy),
-        AT_4096,
+        _macro_f1,
+        digits=4,
+        results=_at_4096,
     ),
-    Target(_MACRO_F1, 0.97, True, 4, "the same, 1024 points", _noisy, partial(_macro_f1, _noisy)),
+    Target(_F1, "the same doors, 1024 points", 0.97, _noisy, _macro_f1, digits=4),
     Target(
-        _MACRO_F1,
+        _F1,
+        "decidable ones, 1024 points",
         0.97,
-        True,
-        4,
-        "of them look like no other state",
-        _noisy_decidable,
-        partial(_macro_f1, _noisy_decidable),
+        lambda rows: _noisy(rows) & ~is_undecidable(rows),
+        _macro_f1,
+        digits=4,
     ),
     Target(
-        "AUROC of *there is a door*",
+        "AUROC of a door",
+        "all samples",
         0.99,
-        True,
-        4,
-        "samples of all kinds",
-        lambda row: True,
-        _head("door, AUROC"),
+        lambda rows: rows["state"].notna(),
+        partial(_head, "door_auroc", 1),
+        digits=4,
     ),
-    Target("expected calibration error, %", 3, False, 1, "doors of all kinds", _is_door, _calibration_error),
+    Target("expected calibration error, %", "doors", 3, _is_door, _calibration_error, at_most=True),
     Target(
         "opening angle, mean error, °",
+        "semi-open hinged doors",
         5,
-        False,
-        1,
-        "semi-open doors that turn",
-        lambda row: row["state"] == "semi_open" and bool(row["opening_angle_deg"]),
-        _head("opening angle, semi-open: mean error, °"),
+        lambda rows: (rows["state"] == "semi_open") & rows["opening_angle_deg"].notna(),
+        partial(_head, "angle_error_semi_open_deg", 1),
+        at_most=True,
     ),
+    Target("hinge side, % correct", "hinged doors", 98, _has_hinge, partial(_head, "hinge_accuracy", 100)),
     Target(
-        "hinge side, % right",
+        "hinge side, % correct",
+        "hinged doors, not closed",
         98,
-        True,
-        1,
-        "doors with hinges",
-        lambda row: bool(row["hinge"]),
-        _head("hinge side", 100),
-    ),
-    Target(
-        "the same",
-        98,
-        True,
-        1,
-        "of them not closed",
-        lambda row: bool(row["hinge"]) and row["state"] != "closed",
-        _head("of doors not closed", 100),
+        lambda rows: _has_hinge(rows) & (rows["state"] != "closed"),
+        partial(_head, "hinge_accuracy_not_closed", 100),
     ),
     Target(
         "frame position, median error, cm",
+        "doors",
         8,
-        False,
-        1,
-        "doors of all kinds",
         _is_door,
-        _head("frame position: median error, m", 100),
+        partial(_head, "frame_position_error_median_m", 100),
+        at_most=True,
     ),
     Target(
         "frame yaw, median error, °",
+        "doors",
         4,
-        False,
-        1,
-        "doors of all kinds",
         _is_door,
-        _head("yaw: median error, °"),
+        partial(_head, "frame_yaw_error_median_deg", 1),
+        at_most=True,
     ),
-    Target(_LOST, 3, False, 1, "doors of `cluttered`, Kinect", _is_cluttered, _points_lost),
-    Target(_LOST, 3, False, 1, "doors of `cluttered`, Xtion", _is_cluttered, _points_lost, CLUTTER),
+    Target(_LOST, "`cluttered`, Kinect", 3, _cluttered, _accuracy_lost, at_most=True),
+    Target(_LOST, "`cluttered`, Xtion", 3, _cluttered, _accuracy_lost, at_most=True, results=_clutter),
 )
 
 
-def targets_table(published: Mapping[str, Published], networks: Sequence[str]) -> Table:
-    """What was asked for, and what every network reaches; what is not published yet nobody knows.
-
-    Args:
-        published: comparisons by where they lie in the folder of everything published.
-        networks: in the order of columns.
-    """
+def targets_frame(networks: Sequence[str]) -> pd.DataFrame:
+    """Return a row for each target: its texts, the number of samples, and a `Measured` for each network."""
     rows = []
     for target in TARGETS:
-        found = dict.fromkeys(networks, Found())
-        samples = "–"
-        if target.where in published:
-            here = published[target.where]
-            found |= {name: target.found(here, name) for name in here.results.networks if name in networks}
-            samples = f"{_count(target, here)} {target.samples}"
-        good = [NAMES[name] for name in networks if target.reached(found[name])]
-        open_ = [NAMES[name] for name in networks if target.undecided(found[name])]
-        said = "all" if len(good) == len(networks) else ", ".join(good) or "none"
+        results = target.results()
+        first = results.frame[
+            (results.frame["method"] == results.networks[0]) & (results.frame["role"] == "test")
+        ]
+        measured = {
+            name: target.measure(results, name, target.chosen) if name in results.networks else Measured()
+            for name in networks
+        }
+        met = [TITLES[name] for name in networks if target.reached(measured[name])]
+        unsure = [TITLES[name] for name in networks if target.undecided(measured[name])]
         rows.append(
-            (
-                target.words,
-                samples,
-                f"{'≥' if target.more_is_better else '≤'} {target.bound:g}",
-                *(_cell(found[name], target.digits) for name in networks),
-                said + (f"; too few to tell: {', '.join(open_)}" if open_ else ""),
-            )
+            {
+                "title": target.title,
+                "samples": f"{target.samples} ({int(target.chosen(first).sum())})",
+                "bound": f"{'≤' if target.at_most else '≥'} {target.bound:g}",
+                "reached": (", ".join(met) or "none") + (f"; unsure: {', '.join(unsure)}" if unsure else ""),
+                "digits": target.digits,
+                **measured,
+            }
         )
-    columns = ("", "of", "asked for", *(NAMES[name] for name in networks), "reached by")
-    return Table("What was asked for, and what is reached", columns, tuple(rows), text_columns=2)
+    return pd.DataFrame(rows)
 
 
-def _count(target: Target, published: Published) -> int:
-    """Tested samples of a target, by the network that says most of them."""
-    results, dataset = published
-    given = results.answers(results.networks[0])
-    rows = manifest_of(dataset, results.pooled(results.networks[0]) if given is None else given)
-    return sum(map(target.is_one, rows))
+def targets_table(networks: Sequence[str]) -> Table:
+    """Build the table of targets and of what every network reaches."""
+    columns = (
+        label_column("title", "metric"),
+        label_column("samples"),
+        Column("target", ("bound",), str),
+        *(Column(TITLES[name], (name, "digits"), _cell) for name in networks),
+        Column("reached by", ("reached",), str),
+    )
+    return Table.from_frame("Targets", targets_frame(networks), columns)
 
 
-def _cell(found: Found, digits: int) -> str:
-    text = number(found.value, digits)
-    return f"{text} ± {found.margin:.{digits}f}" if found.margin else text
+def _cell(measured: Measured, digits: int) -> str:
+    text = number(measured.value, digits)
+    return f"{text} ± {measured.margin:.{digits}f}" if measured.margin else text

@@ -1,15 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A contact sheet of a preset, shaded, with glass tinted: a heading and scenes for each kind; doors in three states.
-
-python tools/scene_sheet.py varied docs/images/varied.png
-python tools/scene_sheet.py cluttered docs/images/cluttered.png
-python tools/scene_sheet.py no-door docs/images/no-door.png
-"""
+"""Contact sheet of a preset: shaded scenes of each kind with tinted glass, doors in three states."""
 
 from __future__ import annotations
 
-import sys
 from collections import defaultdict
+from io import BytesIO
 
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
@@ -30,7 +25,7 @@ GLASS = np.array([150, 205, 225])
 
 
 def picture(row: Row, frame: Frame) -> Image.Image:
-    """A sample as the eye sees it."""
+    """Return a shaded sample with tinted glass."""
     intrinsics, boxes = row.camera.intrinsics(), row.boxes()
     shaded = shade(frame.full, intrinsics).astype(np.float64)
     seen = render(boxes, row.camera_pose(), intrinsics)
@@ -40,37 +35,35 @@ def picture(row: Row, frame: Frame) -> Image.Image:
 
 
 def lines(preset: str) -> dict[str, list[Image.Image]]:
-    """The first samples of each kind, as many as a line holds; what is occluded is that of the closed door."""
-    found = defaultdict(list)
+    """Return the first samples of each kind, as many as a line holds; the closed door decides the occluded share."""
+    found: defaultdict[str, list[Image.Image]] = defaultdict(list)
     for index in range(SCENES):
-        rows, frames = simulate_rows(PRESETS[preset], 0, index)  # type: ignore[index]
+        rows, frames = simulate_rows(PRESETS[preset], 0, index)
         line = found[getattr(rows[0], KINDS[preset])]
         if len(line) < COLUMNS:
             line += [picture(*each) for each in zip(rows, frames, strict=True)]
     return dict(sorted(found.items()))
 
 
-def main(preset: str, target: str) -> None:
-    """Draw the preset's scenes."""
-    drawn, step = lines(preset), HEADING + HEIGHT + GAP
+def draw(preset: str) -> bytes:
+    """Return the sheet of a preset as PNG."""
+    rows, step = lines(preset), HEADING + HEIGHT + GAP
     samples = 1 if preset == "no-door" else len(STATES)  # of a scene; wider gaps between scenes
     left = [column * (WIDTH + GAP) + column // samples * GAP for column in range(COLUMNS)]
     first = HEADING if samples > 1 else 0  # the names of the states
-    sheet = Image.new("RGB", (left[-1] + WIDTH, first + len(drawn) * step), "white")
+    sheet = Image.new("RGB", (left[-1] + WIDTH, first + len(rows) * step), "white")
     pen = ImageDraw.Draw(sheet)
     pen.font = ImageFont.load_default(size=16)
     if first:
         for column in range(COLUMNS):
             state = STATES[column % samples].replace("_", "-")
             pen.text((left[column] + WIDTH / 2, HEADING / 2), state, "black", anchor="mm")
-    for number, (kind, line) in enumerate(drawn.items()):
+    for number, (kind, line) in enumerate(rows.items()):
         top = first + number * step
         words = f"{kind} % of the door hidden" if preset == "cluttered" else kind.replace("_", " ")
         pen.text((0, top + HEADING / 2), words, "black", anchor="lm")
         for tile, x in zip(line, left, strict=False):
             sheet.paste(tile, (x, top + HEADING))
-    sheet.quantize(128).save(target, optimize=True)
-
-
-if __name__ == "__main__":
-    main(*sys.argv[1:])
+    png = BytesIO()
+    sheet.save(png, format="png")
+    return png.getvalue()

@@ -1,12 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Picture docs/images/view.png: the page of `doorstate view`, coloured by the points that the packaged PointNet++ used.
-
-python -m paper.pictures.view DATASET docs/images/view.png
-"""
+"""Page of `doorstate view` in Chromium, coloured by the points that decided the packaged PointNet++."""
 
 from __future__ import annotations
 
-import sys
+import tempfile
 from pathlib import Path
 
 from tests.headless_chromium import open_browser_page
@@ -15,25 +12,22 @@ from doorstate.inference.predictor import Predictor
 from doorstate.viewer.cloud_page import make_entry, render_cloud_page
 from doorstate.viewer.named_clouds import find_named_clouds
 
+from .. import paths
+
 EVERY, SELECTED = 121, 27  # every 121st sample is listed, and the 27th of these is shown
 
 
-def main(dataset: str, target: str) -> None:
-    """Render the page of a prepared data set, and write a screenshot."""
+def draw() -> bytes:
+    """Return a screenshot as PNG; it shows a time, so run it on an idle machine."""
     predictor = Predictor.load()
-    readers = find_named_clouds([Path(dataset)])[::EVERY]
+    readers = find_named_clouds([paths.RESULTS / "datasets" / "ogurob-4096"])[::EVERY]
     html = render_cloud_page(predictor, [make_entry(predictor, read()) for read in readers])
-    path = Path(target).resolve().with_suffix(".html")
-    path.write_text(html, encoding="utf-8")
-    with open_browser_page() as (page, _):
+    with tempfile.TemporaryDirectory() as folder, open_browser_page() as (page, _):
+        path = Path(folder) / "view.html"
+        path.write_text(html, encoding="utf-8")
         page.set_viewport_size({"width": 1100, "height": 700})
         page.goto(f"{path.as_uri()}#{SELECTED}")
         page.wait_for_selector("#plot canvas")
         page.click("[data-color=channels]")
         page.wait_for_timeout(2000)  # until the cloud is drawn
-        page.screenshot(path=target)
-    path.unlink()
-
-
-if __name__ == "__main__":
-    main(*sys.argv[1:])
+        return page.screenshot()

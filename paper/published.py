@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Published results by name of their experiment, each read once."""
+
+from __future__ import annotations
+
+from functools import cache
+
+from doorstate.evaluation.comparison import Results
+from doorstate.evaluation.predictions import join_results, load_results
+from doorstate.evaluation.study import Study, load_study
+
+from .paths import RESULTS
+
+JOINED = {"related": "paper"}
+"""Comparisons that are shown beside the methods of another one."""
+
+
+@cache
+def comparison(name: str) -> Results:
+    """Return a published comparison."""
+    return load_results(RESULTS / name)
+
+
+@cache
+def joined(name: str) -> Results:
+    """Return a published comparison with the one that it is shown beside, if any."""
+    first = JOINED.get(name)
+    return join_results([comparison(first), comparison(name)]) if first else comparison(name)
+
+
+@cache
+def study(name: str) -> Study:
+    """Return a published study."""
+    return load_study(RESULTS / name)
