@@ -15,7 +15,7 @@ from doorstate.inference.gate import DEFAULT_GATE, Gate
 from doorstate.inference.prediction import Prediction
 from doorstate.inference.predictor import Predictor
 from doorstate.rules import create_rule
-from doorstate.rules.base import Rule, measured
+from doorstate.rules.base import Rule, measured_points
 from doorstate.types import STATES, Points
 
 
@@ -58,7 +58,7 @@ class RulePredictor(Predictor):
         """
         started = time.perf_counter()
         cloud = check_single_cloud(cloud)
-        num_points = len(measured(cloud))
+        num_points = len(measured_points(cloud))
         if num_points == 0:
             error = TooFewPointsError("nothing was measured: the cloud holds no points")
             return Prediction.abstain(Abstention.from_error(error))

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Door states from rules: the related work's methods, reconstructed, and two plain baselines, by name."""
+"""Rules that tell the state of a door without training: reconstructed related work and two plain baselines."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from doorstate.errors import ConfigError
+from doorstate.errors import unknown_name
 from doorstate.rules.angle_bins import AngleBinsRule
 from doorstate.rules.base import Rule
 from doorstate.rules.depth_region import DepthRegionRule
@@ -20,16 +20,16 @@ RULES: dict[str, type[Rule[Any]]] = {
 
 
 def list_rules() -> list[str]:
-    """Names that `create_rule` knows."""
+    """Return the names of all rules."""
     return list(RULES)
 
 
 def create_rule(name: str) -> Rule[Any]:
-    """A rule with its default parameters.
+    """Create a rule with its default parameters.
 
     Raises:
         ConfigError: no such rule.
     """
     if name not in RULES:
-        raise ConfigError(f"there is no rule {name!r}: known are {', '.join(RULES)}")
+        raise unknown_name("rule", name, list(RULES))
     return RULES[name]()

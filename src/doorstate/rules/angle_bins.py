@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Angle between leaf and wall in two bins: what robots do today, rebuilt from what is known, not the authors' code."""
+"""Angle between leaf and wall in bins: the usual method on robots, reconstructed without its authors' code."""
 
 from __future__ import annotations
 
@@ -9,13 +9,20 @@ import numpy as np
 
 from doorstate.rules.base import Parameters, Rule, RuleResult, state_by_angle
 from doorstate.rules.plan_lines import Floats, angle_deg
-from doorstate.rules.planes import Plane, pieces, thin, upright_plane
-from doorstate.rules.walls import WallParameters, covered_m, nearby, off_floor, outline, wall_alone
+from doorstate.rules.planes import Plane, component_numbers, thin, upright_plane
+from doorstate.rules.walls import (
+    WallParameters,
+    above_floor,
+    covered_length_m,
+    nearby_points,
+    outline,
+    state_without_leaf,
+)
 from doorstate.types import Points
 
 
 class AngleBinsParameters(Parameters):
-    """Bins, sizes and gates."""
+    """Bins of the angle, sizes of a leaf, and least data."""
 
     closed_below_deg: float = 15.0  # Satya1998-debug/door_navigation, 2026
     open_above_deg: float = 60.0  # the same
@@ -32,47 +39,48 @@ class AngleBinsParameters(Parameters):
 
 
 class AngleBinsRule(Rule[AngleBinsParameters]):
-    """Leaf plane against wall plane: below 15 degrees closed, to 60 semi-open, above open.
+    """Closed below 15 degrees between the planes of leaf and wall, semi-open up to 60, open above.
 
     Plain on purpose: the angle between two planes ends at 90 degrees, so 130 is reported as 50. Without a leaf:
-    `walls.wall_alone`.
+    `walls.state_without_leaf`.
     """
 
     name: ClassVar[str] = "angle_bins"
-    source: ClassVar[str] = "plain baseline: what robots do today"
+    source: ClassVar[str] = "plain baseline: usual on robots today"
     defaults: ClassVar[type[Parameters]] = AngleBinsParameters
 
     def __call__(self, cloud: Points) -> RuleResult:
         p = self.parameters
-        points, measured_share = nearby(cloud, p.farthest_m)
+        points, measured_share = nearby_points(cloud, p.farthest_m)
         if measured_share < p.min_measured_share:
             return RuleResult.abstain("too few pixels were measured")
         if len(points) < p.min_leaf_points:
             return RuleResult.abstain("too few points")
         points = thin(points, p.voxel_m)
-        planes = self._planes(points[off_floor(points, p.wall.floor_margin_m)])
+        planes = self._planes(points[above_floor(points, p.wall.floor_margin_m)])
         if not planes:
             return RuleResult.abstain("no vertical plane")
-        # A thin slanting cut through clutter is wide but full of holes, so what counts is the length that is covered.
-        planes.sort(key=lambda each: -covered_m(each[0], each[1], p.wall.bin_m))
+        # By covered length, because a thin slanting cut through clutter is wide but full of holes.
+        planes.sort(key=lambda surface: -covered_length_m(surface[0], surface[1], p.wall.bin_m))
         wall, on_wall = planes[0]
         for leaf, on_leaf in planes[1:]:
-            on_leaf = on_leaf[pieces(on_leaf, 3 * p.voxel_m) == 0]
-            narrow = p.leaf_width_m[0] <= covered_m(leaf, on_leaf, p.wall.bin_m) <= p.leaf_width_m[1]
+            on_leaf = on_leaf[component_numbers(on_leaf, 3 * p.voxel_m) == 0]
+            narrow = p.leaf_width_m[0] <= covered_length_m(leaf, on_leaf, p.wall.bin_m) <= p.leaf_width_m[1]
             touches = float(np.abs(wall.distances_m(on_leaf)).min()) <= p.touch_m
             if narrow and touches and len(on_leaf) >= p.min_leaf_points:
                 angle = angle_deg(wall.normal, leaf.normal)
-                found = (outline("wall", wall, on_wall), outline("leaf", leaf, on_leaf))
+                detections = (outline("wall", wall, on_wall), outline("leaf", leaf, on_leaf))
                 state = state_by_angle(angle, p.closed_below_deg, p.open_above_deg)
-                return RuleResult(state, opening_angle_deg=angle, detections=found)
-        return wall_alone(wall, points, p.wall)
+                return RuleResult(state, opening_angle_deg=angle, detections=detections)
+        return state_without_leaf(wall, points, p.wall)
 
     def _planes(self, points: Floats) -> list[tuple[Plane, Floats]]:
-        found: list[tuple[Plane, Floats]] = []
-        while len(found) < self.parameters.most_planes:
+        planes: list[tuple[Plane, Floats]] = []
+        while len(planes) < self.parameters.most_planes:
             fit = upright_plane(points, self.parameters.wall.threshold_m)
             if fit is None or fit[1].sum() < self.parameters.min_leaf_points:
                 break
-            found.append((fit[0], points[fit[1]]))
-            points = points[~fit[1]]
-        return found
+            plane, on_plane = fit
+            planes.append((plane, points[on_plane]))
+            points = points[~on_plane]
+        return planes

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What every rule takes and says: a cloud in, a state or a reason for none out, with what it found on the way."""
+"""Interface of a rule: a cloud in; a state, or a reason for none, and the detections that led to it out."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import ClassVar, Generic, TypeVar, cast
 
 import numpy as np
@@ -17,7 +17,7 @@ from doorstate.types import DoorState, Points
 
 @dataclass(frozen=True, eq=False)
 class Detection:
-    """Something found in the cloud, to be drawn over it: one point is a corner, two an edge, more an outline."""
+    """Feature of a cloud, to draw over it: one point is a corner, two an edge, more an outline."""
 
     name: str  # wall, leaf, opening, jamb, corner, ...
     points_m: NDArray[np.float64]  # (K, 3) sensor frame
@@ -25,37 +25,37 @@ class Detection:
 
 @dataclass(frozen=True, eq=False)
 class RuleResult:
-    """A state, or a reason why there is none; and whatever else the rule can tell."""
+    """State of a door, or the reason why there is none, and further estimates of the rule."""
 
     state: DoorState | None
-    reason: str = ""  # why there is no state; empty with one
-    opening_angle_deg: float | None = None  # of the leaf against the wall: 0 is closed
+    reason: str = ""  # for no state; empty with one
+    opening_angle_deg: float | None = None  # between leaf and wall: 0 is closed
     opening_width_m: float | None = None
-    open_or_not: bool | None = None  # of rules that tell open doors from all others
-    detections: tuple[Detection, ...] = field(default=())
+    open_or_not: bool | None = None  # of rules that only separate open doors from all others
+    detections: tuple[Detection, ...] = ()
 
     @classmethod
-    def abstain(cls, reason: str, *found: Detection) -> RuleResult:
-        """No state, and why."""
-        return cls(None, reason, detections=found)
+    def abstain(cls, reason: str, *detections: Detection) -> RuleResult:
+        """Return a result without a state."""
+        return cls(None, reason, detections=detections)
 
 
 class Parameters(FrozenModel):
-    """Base of every rule's parameters: frozen, named with units; a comment beside each says where it comes from."""
+    """Base of the parameters of every rule: frozen, names with units; a comment gives the source of each value."""
 
 
 P = TypeVar("P", bound=Parameters)
 
 
 class Rule(ABC, Generic[P]):
-    """One method. Deterministic: the same cloud gives the same answer.
+    """Deterministic method: the same cloud gives the same result.
 
     Args:
-        parameters: of the rule; its defaults if not given.
+        parameters: of the rule; None takes its defaults.
     """
 
     name: ClassVar[str]
-    source: ClassVar[str]  # whose method it reconstructs
+    source: ClassVar[str]  # publication or practice that the rule reconstructs
     defaults: ClassVar[type[Parameters]]
 
     def __init__(self, parameters: P | None = None) -> None:
@@ -63,22 +63,22 @@ class Rule(ABC, Generic[P]):
 
     @abstractmethod
     def __call__(self, cloud: Points) -> RuleResult:
-        """State of the door in a cloud.
+        """Return the state of the door in a cloud.
 
         Args:
-            cloud: (N, 3), or organized (H, W, 3), metres, x forward, y left, z up, NaN where nothing was measured.
+            cloud: (N, 3) or organized (H, W, 3) metres, x forward, y left, z up, NaN where nothing was measured.
         """
 
 
 def state_by_angle(angle_deg: float, closed_below_deg: float, open_above_deg: float) -> DoorState:
-    """State of a leaf by its angle against the wall; at a limit it is semi-open."""
+    """Return the state of a leaf by its angle to the wall; semi-open at both limits."""
     if angle_deg < closed_below_deg:
         return DoorState.CLOSED
     return DoorState.OPEN if angle_deg > open_above_deg else DoorState.SEMI_OPEN
 
 
-def measured(cloud: Points) -> NDArray[np.float64]:
-    """(M, 3) points that were measured, of a flat or organized cloud."""
+def measured_points(cloud: Points) -> NDArray[np.float64]:
+    """Return the (M, 3) measured points of a flat or organized cloud."""
     flat = np.asarray(cloud, dtype=np.float64).reshape(-1, 3)
-    kept: NDArray[np.float64] = flat[is_measured(flat)]
-    return kept
+    measured: NDArray[np.float64] = flat[is_measured(flat)]
+    return measured

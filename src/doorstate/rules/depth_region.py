@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Free way ahead or not: the RoboCup@Home start door check, rebuilt from what is known, not any team's code."""
+"""Free lane ahead: the check of RoboCup@Home start doors, reconstructed without any team's code."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import numpy as np
 
 from doorstate.rules.base import Detection, Parameters, Rule, RuleResult
 from doorstate.rules.planes import thin
-from doorstate.rules.walls import nearby
+from doorstate.rules.walls import nearby_points
 from doorstate.types import DoorState, Points
 
 
 class DepthRegionParameters(Parameters):
-    """The region ahead and what counts as blocked, free or unknown."""
+    """Size of the lane ahead, and limits of a blocked, a free and an unknown strip."""
 
     lane_width_m: float = 0.6  # chosen: service robots are 0.45 to 0.6 m wide
     strips: int = 6  # chosen: of 0.1 m each, a leaf's edge with its handle blocks one
@@ -31,10 +31,10 @@ class DepthRegionParameters(Parameters):
 
 
 class DepthRegionRule(Rule[DepthRegionParameters]):
-    """Strips of the robot's lane are blocked, free, or unknown: all blocked is closed, all free open, some semi-open.
+    """Closed if all strips of the robot's lane are blocked, open if all are free, semi-open otherwise.
 
-    A strip is free only where its floor was measured beyond the reach, so that missing readings make it unknown, and
-    then there is no answer. No angle; a leaf that covers the lane reads as closed.
+    A strip is free only if its floor was measured beyond the reach; missing readings make it unknown, and then there
+    is no state. No angle; a leaf that covers the lane reads as closed.
     """
 
     name: ClassVar[str] = "depth_region"
@@ -43,7 +43,7 @@ class DepthRegionRule(Rule[DepthRegionParameters]):
 
     def __call__(self, cloud: Points) -> RuleResult:
         p = self.parameters
-        points, measured_share = nearby(cloud, p.farthest_m)
+        points, measured_share = nearby_points(cloud, p.farthest_m)
         if measured_share < p.min_measured_share:
             return RuleResult.abstain("too few pixels were measured")
         if len(points) < p.min_points:
@@ -55,15 +55,15 @@ class DepthRegionRule(Rule[DepthRegionParameters]):
         on_floor = (height_m <= p.floor_clearance_m) & (points[:, 2] < -p.camera_height_m)
         floor = on_floor & (points[:, 0] >= p.reach_m)
         strip = np.floor((points[:, 1] / p.lane_width_m + 0.5) * p.strips)
-        blocked, free = 0, 0
-        surface_m = []
+        free = 0
+        blocked_at_m = []
         for number in range(p.strips):
-            near_m = points[(strip == number) & in_door & before_reach, 0]
-            if len(near_m) >= p.min_points:
-                blocked += 1
-                surface_m.append(float(np.median(near_m)))
+            ahead_m = points[(strip == number) & in_door & before_reach, 0]
+            if len(ahead_m) >= p.min_points:
+                blocked_at_m.append(float(np.median(ahead_m)))
             elif (floor & (strip == number)).sum() >= p.min_points:
                 free += 1
+        blocked = len(blocked_at_m)
         if blocked + free < p.strips:
             return RuleResult.abstain(
                 f"{p.strips - blocked - free} of {p.strips} strips ahead were not measured"
@@ -71,7 +71,7 @@ class DepthRegionRule(Rule[DepthRegionParameters]):
         if blocked == 0:
             return RuleResult(DoorState.OPEN)
         state = DoorState.CLOSED if free == 0 else DoorState.SEMI_OPEN
-        half, x = p.lane_width_m / 2, float(np.median(surface_m))
+        half, x = p.lane_width_m / 2, float(np.median(blocked_at_m))
         return RuleResult(
             state, detections=(Detection("surface", np.array([[x, half, 0.0], [x, -half, 0.0]])),)
         )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Upright surfaces as straight lines in plan view: a robust fit of many trials at once."""
+"""Lines in plan view, which upright surfaces are: a robust fit that tries many candidates at once."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-_PAIRS = 400  # a surface with a fifth of the points is hit by 16 of them
-_REFITS = 3
+_NUM_PAIRS = 400  # 16 of them lie on a surface with a fifth of the points
+_NUM_REFITS = 3
 
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """A line in plan view through `centre` (2,) metres along the unit vector `direction` (2,)."""
+    """Line in plan view through `centre` (2,) metres along the unit vector `direction` (2,)."""
 
     centre: Floats
     direction: Floats
@@ -30,55 +30,57 @@ class Line:
         return normal if normal @ self.centre >= 0 else -normal
 
     def along_m(self, points: Floats) -> Floats:
-        """(N,) places of (N, 2) points along the line, from its centre."""
+        """Return (N,) positions of (N, 2) points along the line, from its centre."""
         along: Floats = (points - self.centre) @ self.direction
         return along
 
     def behind_m(self, points: Floats) -> Floats:
-        """(N,) distances of (N, 2) points; positive behind the line as the camera sees it."""
+        """Return (N,) distances of (N, 2) points; positive behind the line as the camera sees it."""
         behind: Floats = (points - self.centre) @ self.normal
         return behind
 
     def at(self, along_m: float) -> Floats:
-        """The point (2,) of the line at a place."""
-        place: Floats = self.centre + along_m * self.direction
-        return place
+        """Return the point (2,) of the line at a position."""
+        point: Floats = self.centre + along_m * self.direction
+        return point
 
     def foot(self, point: Floats) -> Floats:
-        """The nearest point (2,) of the line to a point (2,)."""
+        """Return the nearest point (2,) of the line to a point (2,)."""
         return self.at(float(self.along_m(point)))
 
     def crossing(self, other: Line) -> Floats:
-        """Where two lines meet (2,); they must not be parallel."""
+        """Return the intersection (2,) with a line that is not parallel."""
         axes = np.stack([self.direction, -other.direction], axis=1)
         return self.at(float(np.linalg.solve(axes, other.centre - self.centre)[0]))
 
     def angle_deg(self, other: Line) -> float:
-        """Angle between two lines, 0 to 90."""
+        """Return the angle between two lines, 0 to 90."""
         return angle_deg(self.direction, other.direction)
 
 
 def strongest_line(
     points: Floats, threshold_m: float, weights: Floats | None = None, *, seed: int = 0
 ) -> tuple[Line, Flags] | None:
-    """The line with most points (or weight) within a distance, and which points (N,) these are.
+    """Return the line with most points, or most weight, within a distance, and a mask (N,) of these points.
+
+    Random pairs of points propose lines; the best is fitted to its points by least squares (RANSAC, docs/adr/0006).
 
     Args:
         points: (N, 2) metres.
-        threshold_m: how far a point of the line may be from it.
-        weights: (N,) how much each point counts; all the same if None.
-        seed: of the pairs of points that are tried.
+        threshold_m: largest distance of a point of the line.
+        weights: (N,) weights of the points; all equal if None.
+        seed: of the random pairs.
 
     Returns:
-        None of fewer than two distinct points.
+        None for fewer than two distinct points.
     """
     if len(points) < 2:
         return None
     weights = np.ones(len(points)) if weights is None else weights
-    first, second = np.random.default_rng(seed).integers(len(points), size=(2, _PAIRS))
+    first, second = np.random.default_rng(seed).integers(len(points), size=(2, _NUM_PAIRS))
     axes = points[second] - points[first]
     lengths_m = np.hypot(*axes.T)
-    apart = lengths_m > 2 * threshold_m  # nearer ones point anywhere
+    apart = lengths_m > 2 * threshold_m  # the direction of nearer ones is noise
     if not apart.any():
         return None
     axes = axes[apart] / lengths_m[apart, None]
@@ -86,7 +88,7 @@ def strongest_line(
     offsets = (normals * points[first[apart]]).sum(axis=1)
     near = np.abs(points @ normals.T - offsets) <= threshold_m  # (N, pairs)
     on_line: Flags = near[:, np.argmax(weights @ near)]
-    for _ in range(_REFITS):
+    for _ in range(_NUM_REFITS):
         line = fit_line(points[on_line], weights[on_line])
         refitted = np.abs(line.behind_m(points)) <= threshold_m
         if np.count_nonzero(refitted) < 2:
@@ -96,12 +98,12 @@ def strongest_line(
 
 
 def fit_line(points: Floats, weights: Floats | None = None) -> Line:
-    """The line of least squared distances to (N, 2) points."""
+    """Return the line with least squared distances to (N, 2) points."""
     centre = np.average(points, axis=0, weights=weights)
     scatter = np.cov((points - centre).T, aweights=weights, ddof=0)
     return Line(centre, np.linalg.eigh(scatter)[1][:, 1])
 
 
-def angle_deg(one: Floats, other: Floats) -> float:
-    """Angle between two directions regardless of their signs, 0 to 90 degrees."""
-    return math.degrees(math.acos(min(1.0, abs(float(one @ other)))))
+def angle_deg(first: Floats, second: Floats) -> float:
+    """Return the angle between two unit vectors regardless of their signs, 0 to 90 degrees."""
+    return math.degrees(math.acos(min(1.0, abs(float(first @ second)))))

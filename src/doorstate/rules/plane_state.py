@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Door-like rectangles among the planes of a cloud (Rusu et al. 2009), rebuilt from what is known, not their code."""
+"""Door-sized rectangles among the planes of a cloud: a reconstruction of Rusu et al. 2009, not their code."""
 
 from __future__ import annotations
 
@@ -10,13 +10,19 @@ import numpy as np
 
 from doorstate.rules.base import Parameters, Rule, RuleResult, state_by_angle
 from doorstate.rules.plan_lines import Floats, angle_deg
-from doorstate.rules.planes import Plane, normals, pieces, thin, upright_plane
-from doorstate.rules.walls import WallParameters, covered_m, nearby, outline, wall_alone
+from doorstate.rules.planes import Plane, component_numbers, normals, thin, upright_plane
+from doorstate.rules.walls import (
+    WallParameters,
+    covered_length_m,
+    nearby_points,
+    outline,
+    state_without_leaf,
+)
 from doorstate.types import Points
 
 
 class PlaneStateParameters(Parameters):
-    """Sizes of doors, tolerances of planes, bins of the angle."""
+    """Sizes of doors, tolerances of planes, limits of the angle."""
 
     voxel_m: float = 0.04  # chosen: twenty points across a leaf
     # Chosen: range of the Xtion; beyond it noise of stereo cameras exceeds planes' thresholds.
@@ -56,22 +62,22 @@ class _Surface(NamedTuple):
     points: Floats  # (N, 3)
 
 
-class _Pair(NamedTuple):
-    """A leaf and the wall it hangs on."""
+class _HungLeaf(NamedTuple):
+    """Leaf with the wall that it hangs on."""
 
     wall: _Surface
     leaf: _Surface
     angle_deg: float
     opening_width_m: float | None
-    whole: bool  # its free end is in view
-    wall_m: float
+    free_end_in_view: bool
+    wall_length_m: float
 
 
 class PlaneStateRule(Rule[PlaneStateParameters]):
     """Upright planes by their normals; the one of a door's size that hangs on another by one end is the leaf.
 
-    The angle is told on both sides of perpendicular by where the wall goes on beside the hinge. Without a leaf:
-    `walls.wall_alone`.
+    Where the wall continues beside the hinge tells angles below and above 90 degrees apart. Without a leaf:
+    `walls.state_without_leaf`.
     """
 
     name: ClassVar[str] = "plane_state"
@@ -80,26 +86,20 @@ class PlaneStateRule(Rule[PlaneStateParameters]):
 
     def __call__(self, cloud: Points) -> RuleResult:
         p = self.parameters
-        points, _ = nearby(cloud, p.farthest_m)
+        points, _ = nearby_points(cloud, p.farthest_m)
         if len(points) < p.min_points:
             return RuleResult.abstain("too few points")
         points = thin(points, p.voxel_m)
         surfaces = self._surfaces(points)
         if not surfaces:
             return RuleResult.abstain("no upright plane")
-        bearing = np.degrees(np.arctan2(points[:, 1], points[:, 0]))
-        view = (bearing.min() + p.view_margin_deg, bearing.max() - p.view_margin_deg)
-        leaves = [(number, leaf) for number, each in enumerate(surfaces) if (leaf := self._rectangle(each))]
-        pairs = [
-            pair
-            for number, leaf in leaves
-            for other, wall in enumerate(surfaces)
-            if other != number and (pair := self._hang(wall, leaf, view))
-        ]
-        if not pairs:
-            widest = max(surfaces, key=lambda each: covered_m(each.plane, each.points, p.wall.bin_m))
-            return wall_alone(widest.plane, points, p.wall)
-        best = max(pairs, key=lambda pair: (pair.whole, pair.wall_m))
+        hung_leaves = self._hung_leaves(surfaces, self._view_deg(points))
+        if not hung_leaves:
+            widest = max(
+                surfaces, key=lambda surface: covered_length_m(surface.plane, surface.points, p.wall.bin_m)
+            )
+            return state_without_leaf(widest.plane, points, p.wall)
+        best = max(hung_leaves, key=lambda hung: (hung.free_end_in_view, hung.wall_length_m))
         return RuleResult(
             state_by_angle(best.angle_deg, p.closed_below_deg, p.open_above_deg),
             opening_angle_deg=best.angle_deg,
@@ -108,83 +108,112 @@ class PlaneStateRule(Rule[PlaneStateParameters]):
         )
 
     def _surfaces(self, points: Floats) -> list[_Surface]:
-        """Planes of points with similar upright normals, those with most normals first."""
+        """Return planes of points with similar upright normals, those with most normals first."""
         p = self.parameters
         normal, _ = normals(points, p.neighbours)
         upright = np.abs(normal[:, 2]) < math.sin(math.radians(p.tilt_deg))
         points = points[upright]
-        heading = np.degrees(np.arctan2(normal[upright, 1], normal[upright, 0])) % 180
-        found: list[_Surface] = []
+        heading_deg = np.degrees(np.arctan2(normal[upright, 1], normal[upright, 0])) % 180
+        surfaces: list[_Surface] = []
         for _ in range(p.most_planes):
-            counts = np.bincount((heading // p.heading_bin_deg).astype(np.int64), minlength=1)
-            peak = (float(counts.argmax()) + 0.5) * p.heading_bin_deg
-            turned = np.abs((heading - peak + 90) % 180 - 90)
-            alike = np.flatnonzero(turned <= p.heading_tolerance_deg)
-            fit = upright_plane(points[alike], p.wall.threshold_m)
+            counts = np.bincount((heading_deg // p.heading_bin_deg).astype(np.int64), minlength=1)
+            peak_deg = (float(counts.argmax()) + 0.5) * p.heading_bin_deg
+            deviation_deg = np.abs((heading_deg - peak_deg + 90) % 180 - 90)
+            similar = np.flatnonzero(deviation_deg <= p.heading_tolerance_deg)
+            fit = upright_plane(points[similar], p.wall.threshold_m)
             if fit is None or fit[1].sum() < p.min_points:
                 break
-            found.append(_Surface(fit[0], points[alike[fit[1]]]))
-            points, heading = np.delete(points, alike[fit[1]], 0), np.delete(heading, alike[fit[1]])
-        return found
+            plane, on_plane = fit
+            surfaces.append(_Surface(plane, points[similar[on_plane]]))
+            points = np.delete(points, similar[on_plane], 0)
+            heading_deg = np.delete(heading_deg, similar[on_plane])
+        return surfaces
 
-    def _rectangle(self, surface: _Surface) -> _Surface | None:
-        """The largest connected piece, if it is as wide and high as a leaf."""
+    def _view_deg(self, points: Floats) -> tuple[float, float]:
+        """Return the directions of the right and left border of the view, less a margin."""
+        bearing_deg = np.degrees(np.arctan2(points[:, 1], points[:, 0]))
+        margin_deg = self.parameters.view_margin_deg
+        return bearing_deg.min() + margin_deg, bearing_deg.max() - margin_deg
+
+    def _hung_leaves(self, surfaces: list[_Surface], view_deg: tuple[float, float]) -> list[_HungLeaf]:
+        """Return every leaf with every wall that it hangs on."""
+        leaves = [(number, self._door_sized_part(surface)) for number, surface in enumerate(surfaces)]
+        pairs = [
+            self._hang(wall, leaf, view_deg)
+            for leaf_number, leaf in leaves
+            for wall_number, wall in enumerate(surfaces)
+            if leaf is not None and wall_number != leaf_number
+        ]
+        return [pair for pair in pairs if pair is not None]
+
+    def _door_sized_part(self, surface: _Surface) -> _Surface | None:
+        """Return the largest connected component, if it is as wide and high as a leaf."""
         p = self.parameters
-        leaf = _Surface(surface.plane, surface.points[pieces(surface.points, 3 * p.voxel_m) == 0])
+        largest = component_numbers(surface.points, 3 * p.voxel_m) == 0
+        leaf = _Surface(surface.plane, surface.points[largest])
         low, high = leaf.points[:, 2].min(), leaf.points[:, 2].max()
         fits = (
-            p.leaf_width_m[0] <= covered_m(*leaf, p.wall.bin_m) <= p.leaf_width_m[1]
+            p.leaf_width_m[0] <= covered_length_m(*leaf, p.wall.bin_m) <= p.leaf_width_m[1]
             and p.leaf_height_m[0] <= high - low <= p.leaf_height_m[1]
             and low < p.camera_heights_m[0]
             and high > p.camera_heights_m[1]
         )
         return leaf if fits else None
 
-    def _hang(self, wall: _Surface, leaf: _Surface, view: tuple[float, float]) -> _Pair | None:
-        """The pair, if the leaf hangs on the wall by one end or lies flush in it."""
+    def _hang(self, wall: _Surface, leaf: _Surface, view_deg: tuple[float, float]) -> _HungLeaf | None:
+        """Return the pair, if the leaf hangs on the wall by one end or lies flush in it."""
         p = self.parameters
-        wall_m = covered_m(*wall, p.wall.bin_m)
+        wall_length_m = covered_length_m(*wall, p.wall.bin_m)
         low, high = leaf.points[:, 2].min(), min(leaf.points[:, 2].max(), p.wall.low_m)
+        # (M, 2) points of the wall in plan view at the heights of the leaf.
         beside = wall.points[(wall.points[:, 2] > low) & (wall.points[:, 2] < high), :2]
-        if wall_m < p.shortest_wall_m or len(beside) == 0:
+        if wall_length_m < p.shortest_wall_m or len(beside) == 0:
             return None
-        tilt = angle_deg(wall.plane.normal, leaf.plane.normal)
-        if tilt < p.closed_below_deg:
-            middle = leaf.points[:, :2].mean(axis=0)
-            flush = (
-                abs(float(np.median(wall.plane.distances_m(leaf.points)))) <= p.flush_m
-                and wall_m > covered_m(*leaf, p.wall.bin_m)
-                and np.linalg.norm(beside - middle, axis=1).min() <= p.farthest_wall_m
-            )
-            return _Pair(wall, leaf, tilt, None, False, wall_m) if flush else None
+        tilt_deg = angle_deg(wall.plane.normal, leaf.plane.normal)
+        if tilt_deg < p.closed_below_deg:
+            flush = self._is_flush(wall, leaf, wall_length_m, beside)
+            return _HungLeaf(wall, leaf, tilt_deg, None, False, wall_length_m) if flush else None
         hinge = np.linalg.solve(
             np.stack([wall.plane.normal[:2], leaf.plane.normal[:2]]),
             np.array([wall.plane.offset_m, leaf.plane.offset_m]),
         )
         outwards = leaf.points[:, :2].mean(axis=0) - hinge
         outwards /= np.linalg.norm(outwards)
-        from_hinge, to_tip = np.quantile((leaf.points[:, :2] - hinge) @ outwards, (0.02, 0.98))
-        # What the camera sees of the wall's line right at the hinge lies on its own side of the leaf: nothing hides it.
+        from_hinge_m, to_tip_m = np.quantile((leaf.points[:, :2] - hinge) @ outwards, (0.02, 0.98))
+        # The part of the wall's line right at the hinge that is visible lies on the camera's side of the leaf:
+        # nothing hides it.
         side = np.array([-wall.plane.normal[1], wall.plane.normal[0]])
         side *= -np.sign(side @ leaf.plane.normal[:2])
-        position = (beside - hinge) @ side
-        if abs(from_hinge) > p.touch_m or np.abs(position).min() > p.farthest_wall_m:
+        position_m = (beside - hinge) @ side
+        if abs(from_hinge_m) > p.touch_m or np.abs(position_m).min() > p.farthest_wall_m:
             return None
-        goes_on = ((position > p.hinge_m) & (position < p.opening_m[0])).sum() >= p.side_points
-        if goes_on and ((-position > p.opening_m[0]) & (-position < p.opening_m[1])).sum() >= p.side_points:
+        continues = ((position_m > p.hinge_m) & (position_m < p.opening_m[0])).sum() >= p.side_points
+        beyond = (-position_m > p.opening_m[0]) & (-position_m < p.opening_m[1])
+        if continues and beyond.sum() >= p.side_points:
             return None  # no opening: furniture, a pillar or another room's wall
-        if goes_on:
+        if continues:
             opening = -side
-        elif _in_view(hinge + side * p.hinge_m, view):
+        elif _is_in_view(hinge + side * p.hinge_m, view_deg):
             opening = side
-        else:  # cannot be told: the smaller angle
+        else:  # both are possible: take the smaller angle
             opening = side * np.sign(side @ outwards)
         angle = math.degrees(math.acos(np.clip(outwards @ opening, -1.0, 1.0)))
-        across = (beside - hinge) @ opening
-        gap = float(across[across > p.wall.opening_width_m[0]].min(initial=math.inf))
-        width = gap if gap <= p.wall.opening_width_m[1] else None
-        return _Pair(wall, leaf, angle, width, _in_view(hinge + outwards * to_tip, view), wall_m)
+        across_m = (beside - hinge) @ opening
+        gap_m = float(across_m[across_m > p.wall.opening_width_m[0]].min(initial=math.inf))
+        width_m = gap_m if gap_m <= p.wall.opening_width_m[1] else None
+        tip_in_view = _is_in_view(hinge + outwards * to_tip_m, view_deg)
+        return _HungLeaf(wall, leaf, angle, width_m, tip_in_view, wall_length_m)
+
+    def _is_flush(self, wall: _Surface, leaf: _Surface, wall_length_m: float, beside: Floats) -> bool:
+        """Return True if a parallel leaf lies in the wall."""
+        p = self.parameters
+        centre = leaf.points[:, :2].mean(axis=0)
+        return bool(
+            abs(float(np.median(wall.plane.distances_m(leaf.points)))) <= p.flush_m
+            and wall_length_m > covered_length_m(*leaf, p.wall.bin_m)
+            and np.linalg.norm(beside - centre, axis=1).min() <= p.farthest_wall_m
+        )
 
 
-def _in_view(place: Floats, view: tuple[float, float]) -> bool:
-    return view[0] < math.degrees(math.atan2(place[1], place[0])) < view[1]
+def _is_in_view(place: Floats, view_deg: tuple[float, float]) -> bool:
+    return view_deg[0] < math.degrees(math.atan2(place[1], place[0])) < view_deg[1]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Planes in clouds: upright ones, thinning, normals, connected pieces."""
+"""Upright planes in clouds, and thinning, normals and connected components of points."""
 
 from __future__ import annotations
 
@@ -15,43 +15,43 @@ from doorstate.rules.plan_lines import Flags, Floats, strongest_line
 
 @dataclass(frozen=True, eq=False)
 class Plane:
-    """Points p with normal . p = offset_m; the normal (3,) has length one and points away from the camera."""
+    """Points p with normal . p = offset_m; the unit normal (3,) points away from the camera."""
 
     normal: Floats
     offset_m: float
 
     def distances_m(self, points: Floats) -> Floats:
-        """(N,) signed distances of (N, 3) points; positive behind the plane as the camera sees it."""
+        """Return (N,) signed distances of (N, 3) points; positive behind the plane as the camera sees it."""
         distances: Floats = points @ self.normal - self.offset_m
         return distances
 
 
 def upright_plane(points: Floats, threshold_m: float, *, seed: int = 0) -> tuple[Plane, Flags] | None:
-    """The plane parallel to gravity with most of (N, 3) points within a distance, and which points (N,) these are.
+    """Return the plane parallel to gravity with most points within a distance, and a mask (N,) of these points.
 
     Args:
         points: (N, 3) metres.
-        threshold_m: how far a point of the plane may be from it.
-        seed: of the pairs of points that are tried.
+        threshold_m: largest distance of a point of the plane.
+        seed: of the random pairs of points that propose planes.
 
     Returns:
-        None where the points do not allow any.
+        None for points without any such plane.
     """
-    found = strongest_line(points[:, :2], threshold_m, seed=seed)
-    if found is None:
+    fit = strongest_line(points[:, :2], threshold_m, seed=seed)
+    if fit is None:
         return None
-    line, on_line = found
+    line, on_line = fit
     normal = np.append(line.normal, 0.0)
     return Plane(normal, float(line.normal @ line.centre)), on_line
 
 
 def thin(points: Floats, voxel_m: float) -> Floats:
-    """The mean point of every occupied voxel (PCL's VoxelGrid); cut far points off first, voxels are counted."""
+    """Return the mean point of every occupied voxel (PCL's VoxelGrid); remove far points first, voxels are counted."""
     return grid(points, voxel_m)[1] if len(points) else points
 
 
 def grid(points: Floats, cell_m: float) -> tuple[NDArray[np.int64], Floats]:
-    """Number (N,) of the occupied cell that each of (N, D) points lies in, and the mean points (K, D) of the cells."""
+    """Return the number (N,) of the cell of each of (N, D) points, and the mean points (K, D) of the cells."""
     cells = np.floor((points - points.min(axis=0)) / cell_m).astype(np.int64)
     keys = np.ravel_multi_index(tuple(cells.T), tuple(cells.max(axis=0) + 1))
     _, number, counts = np.unique(keys, return_inverse=True, return_counts=True)
@@ -60,7 +60,7 @@ def grid(points: Floats, cell_m: float) -> tuple[NDArray[np.int64], Floats]:
 
 
 def normals(points: Floats, neighbours: int) -> tuple[Floats, Floats]:
-    """(N, 3) unit normals towards the camera from nearest neighbours, and curvature (N,), 0 to 1/3 (Rusu 2009)."""
+    """Return (N, 3) unit normals towards the camera, and curvatures (N,) of 0 to 1/3, from neighbours (Rusu 2009)."""
     _, indices = cKDTree(points).query(points, k=min(neighbours, len(points)))
     near = points[indices.reshape(len(points), -1)]  # (N, K, 3)
     near = near - near.mean(axis=1, keepdims=True)
@@ -70,8 +70,8 @@ def normals(points: Floats, neighbours: int) -> tuple[Floats, Floats]:
     return normal, values[:, 0] / np.maximum(values.sum(axis=1), 1e-12)
 
 
-def pieces(points: Floats, reach_m: float) -> NDArray[np.int64]:
-    """Number (N,) of the connected piece of every point; points within reach are connected. The largest piece is 0."""
+def component_numbers(points: Floats, reach_m: float) -> NDArray[np.int64]:
+    """Return the number (N,) of the component of each point, largest first; points within reach are connected."""
     graph = cKDTree(points).sparse_distance_matrix(cKDTree(points), reach_m, output_type="coo_matrix")
     count, label = connected_components(graph, directed=False)
     order = np.argsort(-np.bincount(label, minlength=count), kind="stable")
