@@ -35,9 +35,9 @@ def compare(
     changes: Changes = None,
     jobs: Jobs = 1,
 ) -> None:
-    """Compare networks and rules by cross-validation on the same split.
+    """Compare networks and rules by cross-validation.
 
-    An interrupted comparison continues where it stopped.
+    All methods are tested on the same folds. An interrupted comparison continues where it stopped.
 
     \b
     Examples:

@@ -27,9 +27,10 @@ def export(
         int, typer.Option(help="Number of simulated clouds for the comparison with torch.", min=3)
     ] = 100,
 ) -> None:
-    """Export a network to ONNX, and compare it with torch on simulated clouds.
+    """Export a network to ONNX.
 
-    The file takes points and returns probabilities; it needs onnxruntime, but not torch.
+    The file takes points and returns probabilities; it needs onnxruntime, but not torch. Its probabilities are compared
+    with those of torch on simulated clouds.
 
     \b
     Examples:

@@ -16,7 +16,9 @@ def export_sdf(
     samples: Annotated[list[str], typer.Argument(help="Samples to export, by their sample_id.")],
     out: Annotated[Path, typer.Option(help="Folder for the world files.")] = Path(),
 ) -> None:
-    """Export simulated scenes as SDF worlds for Gazebo, with their depth camera.
+    """Export simulated scenes for Gazebo.
+
+    Each scene becomes an SDF world with its depth camera.
 
     \b
     Examples:

@@ -12,7 +12,7 @@ from doorstate.errors import MissingExtraError
 
 
 def info(as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False) -> None:
-    """List versions, networks, packaged weights, rules and properties of this machine.
+    """List networks, packaged weights, rules and versions.
 
     \b
     Examples:

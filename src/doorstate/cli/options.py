@@ -28,9 +28,11 @@ IntrinsicsFile = Annotated[
     Path | None,
     typer.Option("--intrinsics", help="Camera of depth images: a JSON file, or a ROS camera_info YAML file."),
 ]
-Focal = Annotated[
-    float | None, typer.Option(help="Focal length or image centre in pixels, instead of --intrinsics.")
-]
+Fx = Annotated[float | None, typer.Option(help="Horizontal focal length in pixels, instead of --intrinsics.")]
+Fy = Annotated[float | None, typer.Option(help="Vertical focal length in pixels.")]
+Cx = Annotated[float | None, typer.Option(help="Horizontal image centre in pixels.")]
+Cy = Annotated[float | None, typer.Option(help="Vertical image centre in pixels.")]
+Focal = Fx
 LayoutName = Annotated[
     str | None,
     typer.Option("--layout", help="Folder layout of a published data set: deepdoors2 (or DeepDoors)."),

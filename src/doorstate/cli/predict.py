@@ -14,9 +14,12 @@ from doorstate.cli.options import (
     Bag,
     BudgetMs,
     CameraInfoTopic,
+    Cx,
+    Cy,
     DepthScale,
-    Focal,
     Frame,
+    Fx,
+    Fy,
     IntrinsicsFile,
     Network,
     PointCount,
@@ -58,14 +61,14 @@ def predict(
     units: Units = "m",
     depth_scale: DepthScale = 0.001,
     intrinsics: IntrinsicsFile = None,
-    fx: Focal = None,
-    fy: Focal = None,
-    cx: Focal = None,
-    cy: Focal = None,
+    fx: Fx = None,
+    fy: Fy = None,
+    cx: Cx = None,
+    cy: Cy = None,
 ) -> None:
-    """Predict the state of the door in clouds, depth images or the messages of a ROS bag.
+    """Predict the state of the door in clouds.
 
-    Files: .pcd .ply .npy .npz .xyz .txt .csv, depth .png. The exit code is 1 if there was no prediction for a file or
+    Clouds come from files, depth images or the messages of a ROS bag. Files: .pcd .ply .npy .npz .xyz .txt .csv, depth .png. The exit code is 1 if there was no prediction for a file or
     message.
 
     \b

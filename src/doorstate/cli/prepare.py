@@ -9,9 +9,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from doorstate.cli.options import (
+    Cx,
+    Cy,
     DepthScale,
-    Focal,
     Frame,
+    Fx,
+    Fy,
     IntrinsicsFile,
     LayoutName,
     MaxDepth,
@@ -48,17 +51,20 @@ def prepare(
     units: Units = "m",
     depth_scale: DepthScale = 0.001,
     intrinsics: IntrinsicsFile = None,
-    fx: Focal = None,
-    fy: Focal = None,
-    cx: Focal = None,
-    cy: Focal = None,
+    fx: Fx = None,
+    fy: Fy = None,
+    cx: Cx = None,
+    cy: Cy = None,
     workers: Workers = None,
     shard: ShardOption = None,
     layout: LayoutName = None,
     max_depth: MaxDepth = None,
     thin: Thin = False,
 ) -> None:
-    """Clean clouds and sort them by farthest-point sampling, ready for training.
+    """Clean and sort clouds for training.
+
+    Outliers are removed, and points are sorted by farthest-point sampling: the first N points are a sample of N points.
+    An interrupted preparation continues where it stopped.
 
     \b
     Examples:

@@ -23,7 +23,9 @@ def report(
     ] = None,
     data: Annotated[Path | None, typer.Option(help="Data set of the comparisons, if it was moved.")] = None,
 ) -> None:
-    """Write tables, figures and a self-contained HTML page of comparisons, or of one data set.
+    """Write a report of comparisons or of one data set.
+
+    The folder gets tables, figures and a self-contained HTML page.
 
     \b
     Examples:

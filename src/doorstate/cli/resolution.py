@@ -21,9 +21,9 @@ def resolution(
     out: Annotated[Path | None, typer.Option(help="Folder of the study. [default: runs/NAME]")] = None,
     jobs: Jobs = 1,
 ) -> None:
-    """Measure accuracy and time of trained networks with fewer points.
+    """Test trained networks with fewer points.
 
-    A study file has the keys dataset, start_from (a finished comparison) and points (a list). Optional keys are
+    Measures accuracy and time. A study file has the keys dataset, start_from (a finished comparison) and points (a list). Optional keys are
     protocol, networks, folds, seed and heads (as in the comparison) and the table [fine_tuning] with fields of a
     recipe. An interrupted study continues where it stopped.
 

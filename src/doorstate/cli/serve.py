@@ -35,7 +35,9 @@ def serve(
     ] = None,
     verbose: Annotated[bool, typer.Option("--verbose", help="Log requests on standard error.")] = False,
 ) -> None:
-    """Serve predictions over HTTP: POST a file to /predict, and get JSON.
+    """Serve predictions over HTTP.
+
+    A client POSTs a file to /predict, and gets JSON.
 
     \b
     Examples:

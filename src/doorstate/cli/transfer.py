@@ -16,7 +16,7 @@ def transfer(
     out: Annotated[Path | None, typer.Option(help="Folder of the study. [default: runs/NAME]")] = None,
     jobs: Jobs = 1,
 ) -> None:
-    """Test trained networks on data sets that they were not trained on.
+    """Test trained networks on other data sets.
 
     A study file has the keys networks and num_points, a table [trained] of comparisons (their fold 0 is tested) and a
     table [tested] of prepared data sets. `doorstate report FOLDER/TRAINED/TESTED` reports one pair. An interrupted

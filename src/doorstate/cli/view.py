@@ -14,9 +14,12 @@ import typer
 from doorstate.cli.options import (
     Bag,
     CameraInfoTopic,
+    Cx,
+    Cy,
     DepthScale,
-    Focal,
     Frame,
+    Fx,
+    Fy,
     IntrinsicsFile,
     Network,
     PointCount,
@@ -80,14 +83,14 @@ def view(
     units: Units = "m",
     depth_scale: DepthScale = 0.001,
     intrinsics: IntrinsicsFile = None,
-    fx: Focal = None,
-    fy: Focal = None,
-    cx: Focal = None,
-    cy: Focal = None,
+    fx: Fx = None,
+    fy: Fy = None,
+    cx: Cx = None,
+    cy: Cy = None,
 ) -> None:
-    """Show clouds and predictions in 3D in the browser.
+    """Show clouds and predictions in the browser.
 
-    The page also shows which points the network used.
+    Clouds are shown in 3D, with the points that the network used.
 
     \b
     Examples:
