@@ -68,8 +68,8 @@ def predict(
 ) -> None:
     """Predict the state of the door in clouds.
 
-    Clouds come from files, depth images or the messages of a ROS bag. Files: .pcd .ply .npy .npz .xyz .txt .csv, depth .png. The exit code is 1 if there was no prediction for a file or
-    message.
+    Clouds come from files, depth images or the messages of a ROS bag. Files: .pcd .ply .npy .npz .xyz .txt .csv,
+    depth .png. The exit code is 1 if there was no prediction for a file or message.
 
     \b
     Examples:

@@ -23,9 +23,9 @@ def resolution(
 ) -> None:
     """Test trained networks with fewer points.
 
-    Measures accuracy and time. A study file has the keys dataset, start_from (a finished comparison) and points (a list). Optional keys are
-    protocol, networks, folds, seed and heads (as in the comparison) and the table [fine_tuning] with fields of a
-    recipe. An interrupted study continues where it stopped.
+    Measures accuracy and time. A study file has the keys dataset, start_from (a finished comparison) and points (a
+    list). Optional keys are protocol, networks, folds, seed and heads (as in the comparison) and the table
+    [fine_tuning] with fields of a recipe. An interrupted study continues where it stopped.
 
     \b
     Examples:
