@@ -17,7 +17,8 @@ from doorstate import Predictor, ReadOptions, read_cloud
 from doorstate.cli.compare import compare_with_display
 from doorstate.cli.console import progress_bar
 from doorstate.clouds.preparation import CloudSpec
-from doorstate.dataset.prepare import Preparation, prepare_dataset
+from doorstate.dataset.preparation import Preparation
+from doorstate.dataset.prepare import prepare_dataset
 from doorstate.io.find import find_clouds
 from doorstate.training.experiment import load_experiment
 from doorstate.training.run_folder import run_of

@@ -15,7 +15,8 @@ from hypothesis import settings
 from doorstate.cli import main
 from doorstate.clouds.preparation import CloudSpec
 from doorstate.dataset.join import join_datasets
-from doorstate.dataset.prepare import Preparation, prepare_dataset
+from doorstate.dataset.preparation import Preparation
+from doorstate.dataset.prepare import prepare_dataset
 from doorstate.dataset.store import PreparedDataset
 from doorstate.networks import create_network
 from doorstate.networks.weights import WeightsCard, save_weights

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""DeepDoors2's folders with our own doors in them, seen by a camera on its side: the clouds come back upright."""
+"""DeepDoors2: simulated doors recorded by a turned camera are read upright."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ from PIL import Image
 from doorstate.clouds.preparation import CloudSpec
 from doorstate.dataset.deepdoors2 import CAMERA, deepdoors2_rows, read_deepdoors2
 from doorstate.dataset.layouts import LAYOUTS, find_layout
-from doorstate.dataset.prepare import Preparation, prepare_dataset
+from doorstate.dataset.preparation import Preparation
+from doorstate.dataset.prepare import prepare_dataset
 from doorstate.errors import CameraError, CloudReadError, ConfigError, DatasetError
 from doorstate.io.camera import Intrinsics, Pinhole
 from doorstate.io.depth import depth_to_points
@@ -31,7 +32,7 @@ HEIGHT_M = 1.1
 POSE = CameraPose.from_degrees((0.1, 2.5, HEIGHT_M), -90, 0, 90)
 
 
-def seen(opening_deg: float) -> tuple[np.ndarray, np.ndarray]:
+def recorded(opening_deg: float) -> tuple[np.ndarray, np.ndarray]:
     """(480, 640) depth in metres, NaN beyond 10 m, and parts, as the turned camera sees a door."""
     frame = render(
         scene_boxes(Scene(door=Door(), has_ceiling=False), Opening(angle_deg=opening_deg)), POSE, CAMERA
@@ -50,12 +51,12 @@ def write(path: Path, depth_m: np.ndarray, mode: str = "L") -> Path:
 @pytest.fixture(scope="module")
 def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("data") / "DeepDoors2"
-    closed, opened = seen(1)[0], seen(88)[0]
+    closed, opened = recorded(1)[0], recorded(88)[0]
     kinds = folder / "Door Classification"
     for split in ("Train", "Val", "Test"):
         write(kinds / "Depth" / split / "Closed" / "Door1.png", closed)
         write(kinds / "Depth" / split / "Open" / "Door2.png", opened)
-        write(kinds / "Depth" / split / "Semi-open" / "Door3.png", seen(40)[0])
+        write(kinds / "Depth" / split / "Semi-open" / "Door3.png", recorded(40)[0])
         write(kinds / "RGB" / split / "Closed" / "Door1.png", closed, "RGB")
     write(kinds / "Depth" / "Test" / "Open" / "Door2(1).png", opened)
     write(folder / "Door Detection" / "Annotations" / "Test" / "Door1.png", closed, "RGB")
@@ -66,12 +67,12 @@ def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_door_seen_by_the_turned_camera_stands_upright_at_its_distance(
     opening_deg: float, tmp_path: Path
 ) -> None:
-    depth_m, part = seen(opening_deg)
+    depth_m, part = recorded(opening_deg)
     points = read_deepdoors2(write(tmp_path / "door.png", depth_m), ReadOptions())
     assert points.shape == (640, 480, 3)
     part = np.rot90(part, -1)
     wall, floor, leaf = (
-        points[(part == each) & np.isfinite(points[..., 0])] for each in (Part.WALL, Part.FLOOR, Part.LEAF)
+        points[(part == label) & np.isfinite(points[..., 0])] for label in (Part.WALL, Part.FLOOR, Part.LEAF)
     )
     assert np.abs(wall[:, 0] - 2.5).max() <= STEP_M / 2 + 1e-6
     # A step of depth moves a point of the floor along its ray, which falls by at most 320 / 384.681.
@@ -90,15 +91,15 @@ def test_a_door_seen_by_the_turned_camera_stands_upright_at_its_distance(
 
 
 def test_every_pixel_is_the_turned_cameras_own_point(tmp_path: Path) -> None:
-    depth_m, _ = seen(40)
+    depth_m, _ = recorded(40)
     rounded_m = np.rint(depth_m / STEP_M) * STEP_M
     ours = read_deepdoors2(write(tmp_path / "door.png", depth_m), ReadOptions())
     as_built = depth_to_points(rounded_m, CAMERA, roll_deg=90)
     np.testing.assert_allclose(ours, np.rot90(as_built, -1), atol=1e-5)
 
 
-def test_images_that_nobody_turned_are_turned(tmp_path: Path) -> None:
-    upright = write(tmp_path / "upright.png", seen(40)[0])
+def test_images_as_the_turned_camera_recorded_them_are_turned(tmp_path: Path) -> None:
+    upright = write(tmp_path / "upright.png", recorded(40)[0])
     lying = tmp_path / "lying.png"
     with Image.open(upright) as image:
         image.transpose(Image.Transpose.ROTATE_90).save(lying)
@@ -107,7 +108,7 @@ def test_images_that_nobody_turned_are_turned(tmp_path: Path) -> None:
     )
 
 
-def test_what_is_not_measured_and_what_may_be_cut_off_is_no_point(tmp_path: Path) -> None:
+def test_unmeasured_and_clipped_pixels_are_no_points(tmp_path: Path) -> None:
     pixels = np.full((640, 480), 32, np.uint8)
     pixels[0], pixels[1] = 0, 255
     Image.fromarray(pixels).save(tmp_path / "a.png")
@@ -116,8 +117,8 @@ def test_what_is_not_measured_and_what_may_be_cut_off_is_no_point(tmp_path: Path
     assert (points[2:, :, 0] == 2.0).all()  # the README's own example: 32 is 2 m
 
 
-def test_other_intrinsics_of_the_camera_as_built_replace_the_published(tmp_path: Path) -> None:
-    path = write(tmp_path / "door.png", seen(1)[0])
+def test_other_intrinsics_replace_the_published_ones(tmp_path: Path) -> None:
+    path = write(tmp_path / "door.png", recorded(1)[0])
     published = read_deepdoors2(path, ReadOptions())
     longer = read_deepdoors2(
         path, ReadOptions(intrinsics=Pinhole(2 * CAMERA.fx, 2 * CAMERA.fy, CAMERA.cx, CAMERA.cy))
@@ -128,8 +129,8 @@ def test_other_intrinsics_of_the_camera_as_built_replace_the_published(tmp_path:
 
 
 def test_grey_stored_as_colour_is_read_and_colour_is_not(tmp_path: Path) -> None:
-    grey = write(tmp_path / "grey.png", seen(1)[0])
-    as_colour = write(tmp_path / "colour.png", seen(1)[0], "RGB")
+    grey = write(tmp_path / "grey.png", recorded(1)[0])
+    as_colour = write(tmp_path / "colour.png", recorded(1)[0], "RGB")
     np.testing.assert_array_equal(
         read_deepdoors2(grey, ReadOptions()), read_deepdoors2(as_colour, ReadOptions())
     )
@@ -158,8 +159,8 @@ def test_depth_images_are_listed_once_with_their_state_and_split(root: Path) -> 
     ]
 
 
-def test_the_predecessor_has_its_cropped_images_left_out(tmp_path: Path) -> None:
-    image = seen(1)[0]
+def test_cropped_images_of_the_predecessor_are_skipped(tmp_path: Path) -> None:
+    image = recorded(1)[0]
     base = tmp_path / "Door Classification"
     write(base / "OriginalSize" / "Depth" / "Train" / "Semi" / "1.png", image)
     write(base / "Cropped" / "Depth" / "Train" / "Semi" / "1.png", image[100:300])
@@ -169,21 +170,22 @@ def test_the_predecessor_has_its_cropped_images_left_out(tmp_path: Path) -> None
 
 
 def test_other_folders_are_refused(root: Path, tmp_path: Path) -> None:
-    with pytest.raises(DatasetError, match="no depth images in folders such as Depth/Test/Closed"):
+    with pytest.raises(DatasetError, match="no depth images"):
         deepdoors2_rows(root / "Door Classification" / "RGB")
     with pytest.raises(DatasetError, match="is not a folder"):
         deepdoors2_rows(tmp_path / "nowhere")
-    with pytest.raises(ConfigError, match="no layout 'kitti': choose one of deepdoors2"):
+    with pytest.raises(ConfigError, match="kitti") as refused:
         find_layout("kitti")
+    assert refused.value.field == "layout"
     assert list(LAYOUTS) == ["deepdoors2"]
 
 
 def test_prepare_takes_the_layout(root: Path, tmp_path: Path, run: Run) -> None:
     part, out = root / "Door Classification" / "Depth" / "Test", tmp_path / "p"
-    asked = ("prepare", part, "--layout", "deepdoors2", "--points", 128, "--workers", 1)
-    code, said, err = run(*asked, "--out", out)
+    command = ("prepare", part, "--layout", "deepdoors2", "--points", 128, "--workers", 1)
+    code, out_text, err = run(*command, "--out", out)
     assert (code, err) == (0, "")
-    assert "3 clouds of 128 points" in said
+    assert "3 clouds of 128 points" in out_text
     again = prepare_dataset(
         Preparation(part, CloudSpec(num_points=128), layout="deepdoors2"), out, workers=1
     ).dataset
@@ -193,11 +195,11 @@ def test_prepare_takes_the_layout(root: Path, tmp_path: Path, run: Run) -> None:
         ("semi_open", "test"),
     ]
     assert np.linalg.norm(again.clouds[0], axis=1).max() < 15
-    code, _, err = run(*asked, "--roll", 90, "--out", tmp_path / "q")
+    code, _, err = run(*command, "--roll", 90, "--out", tmp_path / "q")
     assert code == 2
     assert "--layout" in err
-    # The same folder without the layout is another preparation.
-    assert "holds a preparation of something else" in run("prepare", part, "--points", 128, "--out", out)[2]
+    # Without the layout it is a different preparation.
+    assert "something else" in run("prepare", part, "--points", 128, "--out", out)[2]
 
 
 def test_evaluate_takes_the_layout(root: Path, run: Run) -> None:
@@ -207,8 +209,8 @@ def test_evaluate_takes_the_layout(root: Path, run: Run) -> None:
     )
     assert (code, err) == (0, "")
     metrics = json.loads(out)
-    found = metrics["methods"]["plane_state"]
+    result = metrics["methods"]["plane_state"]
     assert metrics["states"] == {"closed": 1, "semi_open": 1, "open": 1}
-    assert found["by"]["split"]["test"]["frames"] == 3
-    # A rule that tells angles needs the doors upright and in true proportion.
-    assert found["all"]["right"] >= 2
+    assert result["by"]["split"]["test"]["frames"] == 3
+    # A rule that measures angles needs doors that are upright and in true proportion.
+    assert result["all"]["right"] >= 2

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Joined data sets hold every sample of their parts, to the bit."""
+"""Joined data sets hold the samples of all sources, bit for bit."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from doorstate.dataset.store import CLOUDS, DESCRIPTION, MANIFEST, PARTS, Prepar
 from doorstate.errors import ConfigError, DatasetError
 
 
-def test_every_sample_is_there_with_its_cloud_and_parts(scene_dataset: PreparedDataset) -> None:
+def test_a_joined_data_set_has_all_clouds_and_parts(scene_dataset: PreparedDataset) -> None:
     folder = scene_dataset.folder.parent
     start = 0
     for name in ("varied-160", "no-door-160"):
@@ -38,7 +38,7 @@ def test_a_joined_sample_is_rendered_again_from_its_row(scene_dataset: PreparedD
         assert {tuple(p) for p in kept.tolist()} <= {tuple(p) for p in raw.reshape(-1, 3).tolist()}
 
 
-def test_a_door_beside_scenes_is_rendered_again_too(
+def test_paper_doors_and_scenes_can_be_joined(
     scene_dataset: PreparedDataset, small_dataset: PreparedDataset, tmp_path: Path
 ) -> None:
     varied = scene_dataset.folder.parent / "varied-160"
@@ -49,18 +49,16 @@ def test_a_door_beside_scenes_is_rendered_again_too(
     assert np.array_equal(raw, small_dataset.raw_cloud(4), equal_nan=True)
 
 
-def test_parts_are_left_out_where_one_does_not_know_them(
-    scene_dataset: PreparedDataset, tmp_path: Path
-) -> None:
+def test_parts_are_left_out_if_a_source_has_none(scene_dataset: PreparedDataset, tmp_path: Path) -> None:
     folder = scene_dataset.folder.parent
     shutil.copytree(folder / "no-door-160", tmp_path / "blind")
     (tmp_path / "blind" / PARTS).unlink()
     joined = join_datasets([folder / "varied-160", tmp_path / "blind"], tmp_path / "joined")
-    assert not joined.knows_parts
+    assert not joined.has_parts
     assert len(joined) == 36
 
 
-def test_a_join_that_was_killed_is_done_again(scene_dataset: PreparedDataset, tmp_path: Path) -> None:
+def test_a_killed_join_is_repeated(scene_dataset: PreparedDataset, tmp_path: Path) -> None:
     parts = [scene_dataset.folder.parent / name for name in ("varied-160", "no-door-160")]
     folder = tmp_path / "joined"
     whole = join_datasets(parts, folder)
@@ -70,11 +68,13 @@ def test_a_join_that_was_killed_is_done_again(scene_dataset: PreparedDataset, tm
     assert len(join_datasets(parts, folder)) == len(whole)
     (folder / DESCRIPTION).rename(tmp_path / DESCRIPTION)
     (folder / "notes.txt").touch()
-    with pytest.raises(ConfigError, match="holds something; choose another folder"):
+    with pytest.raises(ConfigError, match="not empty"):
         join_datasets(parts, folder)
 
 
-def test_clouds_that_end_early_say_so_only_if_all_do(scene_dataset: PreparedDataset, tmp_path: Path) -> None:
+def test_the_depth_limit_is_kept_only_if_all_sources_have_one(
+    scene_dataset: PreparedDataset, tmp_path: Path
+) -> None:
     parts = []
     for name, limit_m in (("varied-160", 2.0), ("no-door-160", 3.0)):
         parts.append(tmp_path / name)
@@ -86,17 +86,17 @@ def test_clouds_that_end_early_say_so_only_if_all_do(scene_dataset: PreparedData
     assert join_datasets(parts, tmp_path / "one").max_depth_m == scene_dataset.max_depth_m == 5.0
 
 
-def test_what_cannot_be_joined_is_refused(
+def test_incompatible_sources_are_refused(
     scene_dataset: PreparedDataset, prepared: Path, tmp_path: Path
 ) -> None:
     varied = scene_dataset.folder.parent / "varied-160"
-    with pytest.raises(DatasetError, match="is there 2 times; data sets that share names cannot be joined"):
+    with pytest.raises(DatasetError, match="2 samples"):
         join_datasets([varied, varied], tmp_path / "a")
-    with pytest.raises(ConfigError, match=r"has 40 points a cloud, .* has 160"):
+    with pytest.raises(ConfigError, match="40"):
         join_datasets([varied, prepared], tmp_path / "b")
     shutil.copytree(scene_dataset.folder.parent / "no-door-160", tmp_path / "thin")
     open_dataset(varied).description.model_copy(update={"thin": True, "samples": 12}).save(tmp_path / "thin")
-    with pytest.raises(ConfigError, match="one was prepared with --thin; prepare one anew"):
+    with pytest.raises(ConfigError, match="thin"):
         join_datasets([varied, tmp_path / "thin"], tmp_path / "b")
-    with pytest.raises(ConfigError, match="exists and holds something"):
+    with pytest.raises(ConfigError, match="not empty"):
         join_datasets([varied], varied)

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Labelled recordings: folders, an index that says how each file is read, and one line for what is wrong with it."""
+"""Labelled recordings: class folders, and an index with labels and cameras."""
 
 from __future__ import annotations
 
-from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +14,7 @@ from doorstate.dataset.labelled import INDEX, check_column, labelled_frames
 from doorstate.errors import CameraError, CloudReadError, ConfigError, DatasetError
 from doorstate.io.camera import Pinhole
 from doorstate.io.options import ReadOptions
+from doorstate.types import NO_DOOR, STATES
 
 REAL = Path(__file__).resolve().parents[2].parent / "shared" / "real"
 CLOUD = "1 2 3\n4 5 6\n"
@@ -23,12 +23,12 @@ CLOUD = "1 2 3\n4 5 6\n"
 @pytest.mark.parametrize(
     "name", ["none", "None", "no_door", "No Doors", "without a door", "no clear door", "02_no-door"]
 )
-def test_folders_without_a_door(name: str) -> None:
+def test_names_of_folders_without_a_door(name: str) -> None:
     assert label_of_folder(name) == "no_door"
 
 
 @pytest.mark.parametrize("name", ["nones", "door", "north door", "doors", "", "nodding"])
-def test_other_folders_mean_nothing(name: str) -> None:
+def test_names_without_a_label(name: str) -> None:
     assert label_of_folder(name) is None
 
 
@@ -44,7 +44,7 @@ def index(root: Path, text: str) -> Path:
     return root
 
 
-def test_folders_name_the_labels(tmp_path: Path) -> None:
+def test_labels_of_folders(tmp_path: Path) -> None:
     root = write(tmp_path, "open/a.xyz", "no door/b.xyz", "other/c.xyz", "closed/none/d.xyz")
     frames = labelled_frames(root)
     assert {(frame.file, frame.label) for frame in frames} == {
@@ -56,16 +56,16 @@ def test_folders_name_the_labels(tmp_path: Path) -> None:
 
 
 def test_folders_without_labels_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(DatasetError, match=r"has no index\.csv, and no clouds in folders named after states"):
+    with pytest.raises(DatasetError, match="has no index"):
         labelled_frames(write(tmp_path, "cats/a.xyz"))
     with pytest.raises(DatasetError, match="is not a folder"):
         labelled_frames(tmp_path / "cats" / "a.xyz")
     (tmp_path / "empty").mkdir()
-    with pytest.raises(CloudReadError, match="no clouds in this folder"):
+    with pytest.raises(CloudReadError, match="no clouds"):
         labelled_frames(tmp_path / "empty")
 
 
-def test_the_index_says_how_each_file_is_read(tmp_path: Path) -> None:
+def test_the_index_overrides_the_read_options_of_its_files(tmp_path: Path) -> None:
     pixels = np.full((4, 6), 800, np.uint16)
     for name in ("own.png", "all.png"):
         Image.fromarray(pixels).save(tmp_path / name)
@@ -90,57 +90,57 @@ def test_the_index_says_how_each_file_is_read(tmp_path: Path) -> None:
     np.testing.assert_allclose(optical[0], [3, -1, -2])
 
 
-def test_an_image_of_another_size_than_the_index_says_is_refused(tmp_path: Path) -> None:
+def test_an_image_of_another_size_than_in_the_index_is_refused(tmp_path: Path) -> None:
     Image.fromarray(np.ones((4, 6), np.uint16)).save(tmp_path / "a.png")
     index(tmp_path, "file,state,fx,fy,cx,cy,width,height\na.png,open,8,8,2,2,640,480\n")
-    with pytest.raises(CameraError, match=r"the image has 6 x 4 pixels"):
+    with pytest.raises(CameraError, match="6 x 4"):
         labelled_frames(tmp_path)[0].read()
 
 
 @pytest.mark.parametrize(
-    ("text", "error", "message"),
+    ("text", "error", "field"),
     [
-        ("name,state\na.xyz,open\n", DatasetError, "has no column 'file', only name, state"),
-        ("file,label\na.xyz,open\n", DatasetError, "has no column 'state', only file, label"),
-        ("file,state\n", DatasetError, "has no lines"),
-        ("file,state\na.xyz,\n", DatasetError, "line 2 has no value in column 'state'"),
-        ("file,state\n,open\n", DatasetError, "line 2 has no value in column 'file'"),
-        ("file,state\na.xyz,open\na.xyz,open\n", DatasetError, "line 3 names 'a.xyz' a second time"),
-        ("file,state\nb.xyz,open\n", DatasetError, "line 2 names 'b.xyz', which is not in the folder"),
-        ("file,state,fx\na.xyz,open,8\n", DatasetError, "line 2 lacks fy, cx, cy: .* belong together"),
-        ("file,state,fx\na.xyz,open,wide\n", DatasetError, "line 2, column fx: 'wide' is no number"),
-        (
-            "file,state,roll_deg\na.xyz,open,nan\n",
-            DatasetError,
-            "line 2, column roll_deg: 'nan' is no number",
-        ),
-        ("file,state,depth_unit_m\na.xyz,open,0\n", CameraError, "metres per unit is impossible"),
-        ("file,state,frame\na.xyz,open,map\n", CameraError, "map"),
+        ("name,state\na.xyz,open\n", DatasetError, "file"),
+        ("file,label\na.xyz,open\n", DatasetError, "state"),
+        ("file,state\n", DatasetError, None),
+        ("file,state\na.xyz,\n", DatasetError, "state"),
+        ("file,state\n,open\n", DatasetError, "file"),
+        ("file,state\na.xyz,open\na.xyz,open\n", DatasetError, "file"),
+        ("file,state\nb.xyz,open\n", DatasetError, "file"),
+        ("file,state,fx\na.xyz,open,8\n", DatasetError, "fy"),
+        ("file,state,fx\na.xyz,open,wide\n", DatasetError, "fx"),
+        ("file,state,roll_deg\na.xyz,open,nan\n", DatasetError, "roll_deg"),
     ],
 )
-def test_an_index_that_cannot_be_used_is_refused_in_one_line(
-    text: str, error: type[Exception], message: str, tmp_path: Path
+def test_an_invalid_index_is_refused_with_its_column(
+    text: str, error: type[Exception], field: str | None, tmp_path: Path
 ) -> None:
-    with pytest.raises(error, match=message) as caught:
+    with pytest.raises(error) as refused:
         labelled_frames(index(write(tmp_path, "a.xyz"), text))
-    assert "\n" not in str(caught.value)
+    assert (refused.value.path, refused.value.field) == (tmp_path / INDEX, field)
+    assert "\n" not in str(refused.value)
 
 
-def test_columns_that_are_not_there_are_named(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "text", ["file,state,depth_unit_m\na.xyz,open,0\n", "file,state,frame\na.xyz,open,map\n"]
+)
+def test_an_index_with_impossible_options_is_refused(text: str, tmp_path: Path) -> None:
+    with pytest.raises(CameraError):
+        labelled_frames(index(write(tmp_path, "a.xyz"), text))
+
+
+def test_a_missing_column_is_refused(tmp_path: Path) -> None:
     frames = labelled_frames(index(write(tmp_path, "a.xyz"), "file,state,door,light\na.xyz,open,1,dim\n"))
     check_column(frames, "light")
-    with pytest.raises(ConfigError, match="no column 'glass'; there are: door, light"):
+    with pytest.raises(ConfigError, match="glass") as refused:
         check_column(frames, "glass")
+    assert "door, light" in refused.value.expected
 
 
-@pytest.mark.skipif(not REAL.is_dir(), reason="the recorded frames are not here")
-def test_the_recorded_frames_have_an_index() -> None:
+@pytest.mark.skipif(not (REAL / INDEX).is_file(), reason="the recorded frames are not here")
+def test_the_recorded_frames_can_be_read() -> None:
     frames = labelled_frames(REAL)
-    assert Counter(frame.label for frame in frames) == {
-        "closed": 13,
-        "semi_open": 2,
-        "open": 2,
-        "no_door": 9,
-        "openings": 1,
-    }
-    assert frames[0].read().shape == (480, 640, 3)
+    labels = {frame.label for frame in frames}
+    assert {*STATES, NO_DOOR} <= labels
+    assert len({frame.file for frame in frames}) == len(frames)
+    assert frames[0].read().shape[-1] == 3

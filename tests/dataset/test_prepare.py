@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Preparation end to end: every cloud the one its row tells of, whatever happened on the way."""
+"""Preparation end to end: clouds equal those of their rows, also after interruptions."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ import pytest
 from doorstate._files import read_csv, write_csv
 from doorstate.clouds.preparation import CloudSpec, prepare_cloud
 from doorstate.dataset import prepare
-from doorstate.dataset.prepare import REJECTED, Preparation, prepare_dataset
+from doorstate.dataset.preparation import Preparation
+from doorstate.dataset.prepare import REJECTED, prepare_dataset
 from doorstate.dataset.store import CLOUDS, DESCRIPTION, MANIFEST, PARTS, open_dataset
 from doorstate.dataset.strata import distance_band, region
 from doorstate.errors import ConfigError, DatasetError
@@ -44,9 +45,7 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
-def test_a_data_set_without_clouds_makes_the_same_ones_from_its_rows(
-    undisturbed: Path, tmp_path: Path
-) -> None:
+def test_a_data_set_without_clouds_renders_them_from_its_rows(undisturbed: Path, tmp_path: Path) -> None:
     stored = open_dataset(undisturbed)
     shutil.copy(undisturbed / MANIFEST, tmp_path)
     stored.description.model_copy(update={"clouds": "replayed"}).save(tmp_path)
@@ -62,20 +61,20 @@ def test_a_data_set_without_clouds_makes_the_same_ones_from_its_rows(
     np.testing.assert_array_equal(rows.raw_cloud(0), replay(unflatten(rows.rows[0])).points)
 
 
-def test_of_replayed_clouds_only_so_many_are_kept(
+def test_the_cache_of_replayed_clouds_is_bounded(
     undisturbed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     stored = open_dataset(undisturbed)
     shutil.copy(undisturbed / MANIFEST, tmp_path)
     stored.description.model_copy(update={"clouds": "replayed"}).save(tmp_path)
     rows = open_dataset(tmp_path)
-    monkeypatch.setattr("doorstate.dataset.store._KEPT_CLOUDS", 2)
+    monkeypatch.setattr("doorstate.dataset.store._CACHED_CLOUDS", 2)
     for index in (0, 1, 2, 1, 0):
         np.testing.assert_array_equal(rows.cloud(index), stored.cloud(index))
-        assert len(rows._made) <= 2
+        assert len(rows._sampled) <= 2
 
 
-def test_clouds_and_parts_are_those_of_the_replayed_rows(tiny_simulation: Path, tmp_path: Path) -> None:
+def test_clouds_and_parts_equal_those_of_the_replayed_rows(tiny_simulation: Path, tmp_path: Path) -> None:
     dataset, rejected = prepare_dataset(Preparation(tiny_simulation, SPEC), tmp_path / "doors", workers=1)
     assert rejected == []
     assert (len(dataset), dataset.num_points, dataset.clouds.shape) == (15, NUM_POINTS, (15, NUM_POINTS, 3))
@@ -97,13 +96,15 @@ def test_clouds_and_parts_are_those_of_the_replayed_rows(tiny_simulation: Path, 
 
 
 @pytest.mark.usefixtures("four_samples_a_piece")
-def test_processes_make_the_same_files(tiny_simulation: Path, undisturbed: Path, tmp_path: Path) -> None:
+def test_several_processes_write_the_same_files(
+    tiny_simulation: Path, undisturbed: Path, tmp_path: Path
+) -> None:
     prepare_dataset(Preparation(tiny_simulation, SPEC), tmp_path / "doors", workers=2)
     assert contents(tmp_path / "doors") == contents(undisturbed)
 
 
 @pytest.mark.usefixtures("four_samples_a_piece")
-def test_goes_on_with_the_pieces_that_are_left(
+def test_a_stopped_preparation_continues_with_the_missing_pieces(
     tiny_simulation: Path, undisturbed: Path, tmp_path: Path
 ) -> None:
     folder = tmp_path / "doors"
@@ -135,7 +136,7 @@ def test_goes_on_with_the_pieces_that_are_left(
 @pytest.mark.parametrize(
     "lost", [[DESCRIPTION], [DESCRIPTION, CLOUDS], [DESCRIPTION, CLOUDS, PARTS, MANIFEST]]
 )
-def test_a_preparation_that_stopped_before_its_end_is_made_whole(
+def test_a_preparation_that_stopped_while_assembling_is_completed(
     tiny_simulation: Path, undisturbed: Path, tmp_path: Path, lost: list[str]
 ) -> None:
     shutil.copytree(undisturbed, tmp_path / "doors")
@@ -145,7 +146,7 @@ def test_a_preparation_that_stopped_before_its_end_is_made_whole(
     assert contents(tmp_path / "doors") == contents(undisturbed)
 
 
-def test_a_whole_data_set_is_opened_and_left_over_pieces_are_cleared(
+def test_a_complete_data_set_is_opened_and_its_pieces_are_removed(
     tiny_simulation: Path, undisturbed: Path, tmp_path: Path
 ) -> None:
     folder = tmp_path / "doors"
@@ -153,58 +154,58 @@ def test_a_whole_data_set_is_opened_and_left_over_pieces_are_cleared(
     (folder / "pieces").mkdir()
     (folder / "pieces" / "00000.npz").touch()
     steps: list[tuple[int, int]] = []
-    found = prepare_dataset(
+    summary = prepare_dataset(
         Preparation(tiny_simulation, SPEC),
         folder,
         workers=1,
         progress=lambda *step: steps.append(step),
     )
-    assert (len(found.dataset), steps) == (15, [(1, 1)])
+    assert (len(summary.dataset), steps) == (15, [(1, 1)])
     assert contents(folder) == contents(undisturbed)
 
 
-def test_clouds_end_where_they_are_told_to(tiny_simulation: Path, tmp_path: Path) -> None:
-    asked = Preparation(tiny_simulation, CloudSpec(num_points=NUM_POINTS, max_depth_m=3.0))
-    near = prepare_dataset(asked, tmp_path / "near", workers=1).dataset
+def test_clouds_end_at_the_maximum_depth(tiny_simulation: Path, tmp_path: Path) -> None:
+    preparation = Preparation(tiny_simulation, CloudSpec(num_points=NUM_POINTS, max_depth_m=3.0))
+    near = prepare_dataset(preparation, tmp_path / "near", workers=1).dataset
     far = prepare_dataset(Preparation(tiny_simulation, SPEC), tmp_path / "far", workers=1).dataset
     assert (near.max_depth_m, far.max_depth_m) == (3.0, 5.0)
     assert near.clouds[..., 0].max() <= 3.0 < far.clouds[..., 0].max()
-    with pytest.raises(ConfigError, match="preparation of something else"):
+    with pytest.raises(ConfigError, match="something else"):
         prepare_dataset(
-            asked._replace(spec=CloudSpec(num_points=NUM_POINTS, max_depth_m=2.0)),
+            preparation._replace(spec=CloudSpec(num_points=NUM_POINTS, max_depth_m=2.0)),
             tmp_path / "near",
             workers=1,
         )
 
 
-def test_thinned_clouds_are_those_that_a_predictor_samples(tiny_simulation: Path, tmp_path: Path) -> None:
-    asked = Preparation(tiny_simulation, CloudSpec(num_points=NUM_POINTS, thin=True))
-    thinned = prepare_dataset(asked, tmp_path / "thin", workers=1).dataset
+def test_thinned_clouds_equal_those_of_a_predictor(tiny_simulation: Path, tmp_path: Path) -> None:
+    preparation = Preparation(tiny_simulation, CloudSpec(num_points=NUM_POINTS, thin=True))
+    thinned = prepare_dataset(preparation, tmp_path / "thin", workers=1).dataset
     assert thinned.description.thin
     for index in (0, 7):
         expected = prepare_cloud(thinned.raw_cloud(index), CloudSpec(num_points=NUM_POINTS, thin=True))
-        every = prepare_cloud(thinned.raw_cloud(index), SPEC)
+        unthinned = prepare_cloud(thinned.raw_cloud(index), SPEC)
         np.testing.assert_array_equal(thinned.cloud(index), expected.points)
-        assert not np.array_equal(expected.points, every.points)
+        assert not np.array_equal(expected.points, unthinned.points)
     shutil.copy(tmp_path / "thin" / MANIFEST, tmp_path)
     thinned.description.model_copy(update={"clouds": "replayed"}).save(tmp_path)
     np.testing.assert_array_equal(open_dataset(tmp_path).cloud(7), thinned.cloud(7))
-    with pytest.raises(ConfigError, match="preparation of something else"):
-        prepare_dataset(asked._replace(spec=SPEC), tmp_path / "thin", workers=1)
+    with pytest.raises(ConfigError, match="something else"):
+        prepare_dataset(preparation._replace(spec=SPEC), tmp_path / "thin", workers=1)
 
 
 @pytest.mark.parametrize(
     ("column", "value", "message"),
     [
-        ("depth_sha256", "0" * 64, "renders differently than its manifest says"),
-        ("depth_sha256", None, "renders differently than its manifest says"),
-        ("opening_angle_deg", "44.0", "renders differently than its manifest says"),
-        ("distance_m", None, "column distance_m: Field required"),
-        ("distance_m", "far", "column distance_m: "),
-        ("camera.width", "broad", "column camera.width: "),
+        ("depth_sha256", "0" * 64, "depth_sha256"),
+        ("depth_sha256", None, "depth_sha256"),
+        ("opening_angle_deg", "44.0", "depth_sha256"),
+        ("distance_m", None, "column distance_m"),
+        ("distance_m", "far", "column distance_m"),
+        ("camera.width", "broad", "column camera.width"),
     ],
 )
-def test_a_manifest_that_was_changed_is_noticed(
+def test_a_changed_manifest_is_refused(
     tiny_simulation: Path, tmp_path: Path, column: str, value: str | None, message: str
 ) -> None:
     source = tmp_path / "changed"
@@ -224,7 +225,7 @@ def test_a_manifest_that_was_changed_is_noticed(
 def test_an_unfinished_simulation_is_not_prepared(tiny_simulation: Path, tmp_path: Path) -> None:
     shutil.copytree(tiny_simulation, tmp_path / "unfinished")
     (tmp_path / "unfinished" / MANIFEST).unlink()
-    with pytest.raises(DatasetError, match="the simulation is not complete; run 'doorstate simulate' again"):
+    with pytest.raises(DatasetError, match="not complete"):
         prepare_dataset(
             Preparation(tmp_path / "unfinished", SPEC),
             tmp_path / "doors",
@@ -232,24 +233,24 @@ def test_an_unfinished_simulation_is_not_prepared(tiny_simulation: Path, tmp_pat
         )
 
 
-def test_another_preparation_or_other_files_are_not_written_over(
+def test_a_folder_with_other_contents_is_refused(
     tiny_simulation: Path, undisturbed: Path, tmp_path: Path
 ) -> None:
     before = contents(undisturbed)
-    with pytest.raises(ConfigError, match="holds a preparation of something else"):
+    with pytest.raises(ConfigError, match="something else"):
         prepare_dataset(
             Preparation(tiny_simulation, CloudSpec(num_points=NUM_POINTS // 2)), undisturbed, workers=1
         )
     (tmp_path / "mine.txt").touch()
     for folder in (tmp_path, tmp_path / "mine.txt"):
-        with pytest.raises(ConfigError, match="holds something else"):
+        with pytest.raises(ConfigError, match="something else"):
             prepare_dataset(Preparation(tiny_simulation, SPEC), folder, workers=1)
     assert contents(undisturbed) == before
 
 
 @pytest.fixture
 def class_folders(tmp_path: Path) -> Path:
-    """Five good clouds, and files that are none."""
+    """Five valid clouds, and invalid files."""
     root = tmp_path / "OGUROB"
     rng = np.random.default_rng(0)
     for name in ("Open/a.pcd", "Open/b.pcd", "semi-open/a.pcd", "Closed/a.pcd", "Closed/b.pcd"):
@@ -263,7 +264,7 @@ def class_folders(tmp_path: Path) -> Path:
     return root
 
 
-def test_files_of_class_folders_are_prepared_and_the_rest_listed_with_its_reason(
+def test_class_folders_are_prepared_and_rejected_files_listed_with_reasons(
     class_folders: Path, tmp_path: Path
 ) -> None:
     folder = tmp_path / "doors"
@@ -289,17 +290,16 @@ def test_files_of_class_folders_are_prepared_and_the_rest_listed_with_its_reason
         "Open/empty.csv",
         "Open/notes.txt",
     }
-    assert reasons["Closed/small.pcd"].startswith("too few points: 200 distinct, 256 needed")
-    assert reasons["Closed/tiled.pcd"].startswith("too few points: 200 distinct, 256 needed")
-    assert reasons["Open/empty.csv"] == "the cloud is empty: it holds no points"
-    assert reasons["Open/notes.txt"].startswith("notes.txt: expected rows of numbers")
-    assert reasons["Open/broken.pcd"].startswith("broken.pcd: ")
+    for name in ("Closed/small.pcd", "Closed/tiled.pcd"):
+        assert "200" in reasons[name]
+        assert "256" in reasons[name]
+    assert all(reason and "\n" not in reason for reason in reasons.values())
     assert read_csv(folder / REJECTED) == rejected
     again = prepare_dataset(Preparation(class_folders, SPEC), folder, workers=1)
     assert again.rejected == rejected
 
 
-def test_poses_bring_strata_and_read_options_are_obeyed(class_folders: Path, tmp_path: Path) -> None:
+def test_poses_add_strata_and_read_options_apply(class_folders: Path, tmp_path: Path) -> None:
     poses = tmp_path / "poses.csv"
     poses.write_text("file,x_m,y_m,room\nOpen/a.pcd,0.0,2.2,hall\n", encoding="utf-8")
     options = ReadOptions(frame="optical")
@@ -316,15 +316,13 @@ def test_poses_bring_strata_and_read_options_are_obeyed(class_folders: Path, tmp
 def test_changed_files_are_another_preparation(class_folders: Path, tmp_path: Path) -> None:
     prepare_dataset(Preparation(class_folders, SPEC), tmp_path / "doors", workers=1)
     (class_folders / "Open" / "b.pcd").unlink()
-    with pytest.raises(ConfigError, match="holds a preparation of something else"):
+    with pytest.raises(ConfigError, match="something else"):
         prepare_dataset(Preparation(class_folders, SPEC), tmp_path / "doors", workers=1)
 
 
-def test_nothing_that_could_be_prepared_is_an_error_with_the_first_reason(
+def test_a_source_without_usable_clouds_is_refused_with_the_first_reason(
     class_folders: Path, tmp_path: Path
 ) -> None:
-    with pytest.raises(
-        DatasetError, match="none of the 10 clouds could be prepared; the first: too few points: 600"
-    ):
+    with pytest.raises(DatasetError, match=r"none of the 10 clouds could be prepared; the first: .*600"):
         prepare_dataset(Preparation(class_folders, CloudSpec(num_points=4096)), tmp_path / "doors", workers=1)
-    assert not (tmp_path / "doors").exists(), "the same folder is free for another try"
+    assert not (tmp_path / "doors").exists(), "the folder can be used again"

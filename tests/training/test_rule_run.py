@@ -12,7 +12,8 @@ from sklearn.metrics import f1_score
 
 from doorstate._files import read_csv
 from doorstate.clouds.preparation import CloudSpec
-from doorstate.dataset.prepare import Preparation, prepare_dataset
+from doorstate.dataset.preparation import Preparation
+from doorstate.dataset.prepare import prepare_dataset
 from doorstate.dataset.splits import Role
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import ConfigError, DatasetError

@@ -77,7 +77,8 @@ def prepare(
     from doorstate._jobs import Shard
     from doorstate.cli.console import progress_bar, stdout
     from doorstate.clouds.preparation import CloudSpec
-    from doorstate.dataset.prepare import Preparation, prepare_dataset, prepare_shard
+    from doorstate.dataset.preparation import Preparation
+    from doorstate.dataset.prepare import prepare_dataset, prepare_shard
 
     options = read_options(frame, roll, units, depth_scale, intrinsics, (fx, fy, cx, cy), layout)
     if layout is not None and poses is not None:

@@ -65,7 +65,7 @@ def simulate(
     from doorstate.cli.console import progress_bar, stderr, stdout
     from doorstate.cli.prepare import print_summary
     from doorstate.clouds.preparation import CloudSpec
-    from doorstate.dataset.prepare import Preparation
+    from doorstate.dataset.preparation import Preparation
     from doorstate.dataset.simulated import Sampler, simulate_prepared
     from doorstate.simulation.settings import RAW_KINDS, settings_for
     from doorstate.simulation.writer import simulate_dataset, simulate_shard

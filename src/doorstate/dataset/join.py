@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Several prepared data sets as one: what weights for the real world are trained on."""
+"""Concatenation of prepared data sets."""
 
 from __future__ import annotations
 
@@ -21,46 +21,46 @@ from doorstate.dataset.store import (
 )
 from doorstate.errors import ConfigError, DatasetError
 
-_BESIDE = " + "  # between the sources of a joined data set, each named once
+_SEPARATOR = " + "  # between the sources of a joined data set
 
 
 def join_datasets(sources: Sequence[Path], folder: Path) -> PreparedDataset:
-    """Write the samples of prepared data sets behind one another; parts of points if all of them know theirs.
+    """Write the samples of prepared data sets one after another, with parts of points if all data sets have them.
 
-    What a killed join left behind is written anew.
+    Files of a killed join are overwritten.
 
     Raises:
-        ConfigError: the folder is not empty, or the data sets have clouds of different sizes.
-        DatasetError: one cannot be opened, or two hold a sample of the same name.
+        ConfigError: the folder is not empty, or the clouds differ in size or sampling.
+        DatasetError: a data set cannot be opened, or two have a sample of the same name.
     """
-    if not (is_vacant(folder) or _is_begun(folder)):
-        raise ConfigError(f"{folder}: exists and holds something; choose another folder")
+    if not (is_vacant(folder) or _is_unfinished(folder)):
+        raise ConfigError("exists and is not empty", path=folder, hint="choose another folder")
     datasets = [open_dataset(source) for source in sources]
     num_points = datasets[0].num_points
     for source, dataset in zip(sources, datasets, strict=True):
         if dataset.num_points != num_points:
             raise ConfigError(
-                f"{source}: has {dataset.num_points} points a cloud, {sources[0]} has {num_points}; prepare one anew"
+                f"has clouds of {dataset.num_points} points",
+                path=source,
+                expected=f"{num_points} as in {sources[0]}",
             )
-        check_thinned_alike(dataset, datasets[0])
+        check_same_sampling(dataset, datasets[0])
     rows = [row for dataset in datasets for row in dataset.rows]
     name, count = Counter(row["sample_id"] for row in rows).most_common(1)[0]
     if count > 1:
-        raise DatasetError(
-            f"sample {name!r} is there {count} times; data sets that share names cannot be joined"
-        )
+        raise DatasetError(f"{count} samples are named {name!r}", field="sample_id")
     folder.mkdir(parents=True, exist_ok=True)
     _stack(folder / CLOUDS, [dataset.clouds for dataset in datasets])
-    if all(dataset.knows_parts for dataset in datasets):
-        every = [dataset.parts_of(np.arange(len(dataset)), num_points) for dataset in datasets]
-        _stack(folder / PARTS, every)
+    if all(dataset.has_parts for dataset in datasets):
+        parts = [dataset.parts_of(np.arange(len(dataset)), num_points) for dataset in datasets]
+        _stack(folder / PARTS, parts)
     write_csv(folder / MANIFEST, rows)
-    parts = [dataset.description.source for dataset in datasets]
+    names = [name for dataset in datasets for name in dataset.description.source.split(_SEPARATOR)]
     limits_m = [dataset.description.max_depth_m for dataset in datasets]
     kinds = {dataset.description.kind for dataset in datasets}
     DatasetDescription(
         kind="simulated" if kinds == {"simulated"} else "imported",
-        source=_BESIDE.join(dict.fromkeys(each for part in parts for each in part.split(_BESIDE))),
+        source=_SEPARATOR.join(dict.fromkeys(names)),
         num_points=num_points,
         samples=len(rows),
         max_depth_m=None if None in limits_m else max(limit_m for limit_m in limits_m if limit_m),
@@ -70,14 +70,19 @@ def join_datasets(sources: Sequence[Path], folder: Path) -> PreparedDataset:
     return open_dataset(folder)
 
 
-def check_thinned_alike(one: PreparedDataset, other: PreparedDataset) -> None:
-    """Raise ConfigError for data sets that must not be learned together: only one was sampled as a predictor does."""
-    if one.description.thin != other.description.thin:
-        raise ConfigError(f"{one.folder} and {other.folder}: one was prepared with --thin; prepare one anew")
+def check_same_sampling(dataset: PreparedDataset, reference: PreparedDataset) -> None:
+    """Raise ConfigError if one data set was thinned before sampling and the other was not."""
+    if dataset.description.thin != reference.description.thin:
+        raise ConfigError(
+            f"thin is {dataset.description.thin}",
+            path=dataset.folder,
+            expected=f"{reference.description.thin} as in {reference.folder}",
+            hint="prepare the data sets with the same settings",
+        )
 
 
-def _is_begun(folder: Path) -> bool:
-    """Whether a join was killed here, after its clouds were written and before its description was."""
+def _is_unfinished(folder: Path) -> bool:
+    """Return True for the files of a join that was killed before it wrote its description."""
     names = {path.name for path in folder.iterdir() if ".tmp." not in path.name} if folder.is_dir() else set()
     return CLOUDS in names and names <= {CLOUDS, PARTS, MANIFEST}
 
@@ -85,7 +90,7 @@ def _is_begun(folder: Path) -> bool:
 def _stack(target: Path, arrays: Sequence[np.ndarray]) -> None:
     shape = (sum(len(array) for array in arrays), *arrays[0].shape[1:])
     with atomic_path(target) as temporary:
-        whole = np.lib.format.open_memmap(temporary, mode="w+", dtype=arrays[0].dtype, shape=shape)
-        np.concatenate(arrays, out=whole)
-        whole.flush()
-        del whole
+        joined = np.lib.format.open_memmap(temporary, mode="w+", dtype=arrays[0].dtype, shape=shape)
+        np.concatenate(arrays, out=joined)
+        joined.flush()
+        del joined

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Published data sets by name: which of their files hold clouds, what they show, and how they are read."""
+"""Layouts of published data sets by name."""
 
 from __future__ import annotations
 
@@ -14,11 +14,10 @@ from doorstate.types import Points
 
 
 class Layout(NamedTuple):
-    """How a published data set is laid out."""
+    """Functions that list and read the clouds of a published data set."""
 
-    rows: Callable[
-        [Path], list[dict[str, str]]
-    ]  # one a cloud: sample_id, state, file below the folder, whatever else
+    rows: Callable[[Path], list[dict[str, str]]]
+    """One row for each cloud of a folder: sample_id, state, file below the folder, further columns."""
     read: Callable[[Path, ReadOptions], Points]
 
 
@@ -26,11 +25,11 @@ LAYOUTS: dict[str, Layout] = {"deepdoors2": Layout(deepdoors2_rows, read_deepdoo
 
 
 def find_layout(name: str) -> Layout:
-    """A layout by name.
+    """Return a layout by name.
 
     Raises:
-        ConfigError: there is none of that name.
+        ConfigError: no such layout.
     """
     if name not in LAYOUTS:
-        raise ConfigError(f"no layout {name!r}: choose one of {', '.join(LAYOUTS)}")
+        raise ConfigError(f"no layout {name!r}", field="layout", expected=f"one of {', '.join(LAYOUTS)}")
     return LAYOUTS[name]

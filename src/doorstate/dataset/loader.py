@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Batches of normalised clouds; what an epoch draws depends on its seed alone."""
+"""Batches of normalised clouds; the order and augmentation of an epoch depend on its seed alone."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ FindNeighbours = Callable[[Tensor], tuple[Tensor, ...]]
 
 
 class Batch(NamedTuple):
-    """(B, n, 3) float32 normalised points, (B,) int64 labels, what the loader's search found, and targets by head."""
+    """Normalised points (B, n, 3) float32, labels (B,) int64, precomputed neighbourhoods, and targets by head."""
 
     points: Tensor
     labels: Tensor
@@ -37,19 +37,20 @@ class Batch(NamedTuple):
 
 
 def check_states(dataset: PreparedDataset, sample_ids: Sequence[str], heads: Sequence[str]) -> None:
-    """Raise ConfigError if samples show no door and there is no head that could say so."""
+    """Raise ConfigError if samples show no door and no head predicts the presence of a door."""
     if DOOR in heads:
         return
     without = [sample for sample in sample_ids if dataset.labels[dataset.index_of(sample)] >= len(DoorState)]
     if without:
         raise ConfigError(
-            f"{dataset.folder}: {len(without)} samples show no door, such as {without[0]}; "
-            f"a network of three states learns nothing from them: leave them out, or add the head '{DOOR}'"
+            f"{len(without)} samples show no door, such as {without[0]}",
+            path=dataset.folder,
+            hint=f"leave them out, or add the head {DOOR!r}",
         )
 
 
 class _Loaded(NamedTuple):
-    """Of M samples: (M, n, 3) normalised points, (M, 3) centroids in metres, (M,) labels, targets by head, parts."""
+    """Points (M, n, 3), centroids (M, 3) in metres, labels (M,), targets by head, and parts of M samples."""
 
     points: np.ndarray
     centroids: np.ndarray
@@ -59,7 +60,7 @@ class _Loaded(NamedTuple):
 
 
 class CloudLoader:
-    """The first `num_points` of chosen samples, normalised once and kept in memory."""
+    """The first `num_points` of selected samples, normalised once and held in memory."""
 
     def __init__(
         self,
@@ -68,42 +69,41 @@ class CloudLoader:
         num_points: int,
         find_neighbours: FindNeighbours | None = None,
         heads: Sequence[str] = (),
-        more: Sequence[PreparedDataset] = (),
+        extra_datasets: Sequence[PreparedDataset] = (),
     ) -> None:
         """Load clouds.
 
         Args:
-            dataset: clouds.
-            sample_ids: which, in order.
+            dataset: prepared clouds.
+            sample_ids: samples to load, in order.
             num_points: of each cloud.
-            find_neighbours: done once per cloud, when it is first needed, before any augmentation: give it only with
-                augmentations that leave its result as it is.
-            heads: names of the heads that the batches hold targets for; with "door" among them samples without
-                one are allowed, and labelled `IGNORE_INDEX`.
-            more: data sets whose samples follow, all of them.
+            find_neighbours: search that runs once per cloud, before augmentation; only for augmentations that do not
+                change its result.
+            heads: names of the heads that need targets; with "door" among them, samples without a door are allowed
+                and labelled `IGNORE_INDEX`.
+            extra_datasets: data sets to append as a whole.
 
         Raises:
-            ConfigError: more points are asked for than the data set holds, a sample shows no door, or nobody knows the
-                parts of the points.
+            ConfigError: a data set has fewer points, samples show no door, or the parts of points are not stored.
         """
-        chosen = [(dataset, list(sample_ids)), *((each, each.sample_ids) for each in more)]
-        self.sample_ids = [sample for _, samples in chosen for sample in samples]
-        loaded = [_load(source, samples, num_points, heads) for source, samples in chosen]
-        self._points = _joined([each.points for each in loaded])
-        self.centroids = _joined([each.centroids for each in loaded])  # (M, 3) metres
-        self._labels = _joined([each.labels for each in loaded])
-        self._targets = {name: _joined([each.targets[name] for each in loaded]) for name in loaded[0].targets}
-        parts = [each.parts for each in loaded if each.parts is not None]
-        self._parts = _joined(parts) if parts else None
-        self._neighbours = (
-            None if find_neighbours is None else _KnownNeighbours(find_neighbours, self._points)
-        )
+        selected = [(dataset, list(sample_ids)), *((extra, extra.sample_ids) for extra in extra_datasets)]
+        self.sample_ids = [sample for _, samples in selected for sample in samples]
+        loaded = [_load(source, samples, num_points, heads) for source, samples in selected]
+        self._points = _concatenate([samples.points for samples in loaded])
+        self.centroids = _concatenate([samples.centroids for samples in loaded])  # (M, 3) metres
+        self._labels = _concatenate([samples.labels for samples in loaded])
+        self._targets = {
+            name: _concatenate([samples.targets[name] for samples in loaded]) for name in loaded[0].targets
+        }
+        parts = [samples.parts for samples in loaded if samples.parts is not None]
+        self._parts = _concatenate(parts) if parts else None
+        self._neighbours = None if find_neighbours is None else _NeighbourCache(find_neighbours, self._points)
 
     def __len__(self) -> int:
         return len(self._labels)
 
     def in_order(self, batch_size: int) -> Iterator[Batch]:
-        """Every sample once, in order, unchanged."""
+        """Yield every sample once, in order and without augmentation."""
         for start in range(0, len(self), batch_size):
             yield self._batch(np.arange(start, min(start + batch_size, len(self))), None)
 
@@ -115,9 +115,14 @@ class CloudLoader:
         skip: int = 0,
         limit: int | None = None,
     ) -> Iterator[Batch]:
-        """One training epoch: shuffled, augmented, an incomplete last batch and the first `skip` left out.
+        """Yield one training epoch, shuffled and augmented, without an incomplete last batch.
 
-        With a limit an epoch is so many clouds, drawn anew, and not all.
+        Args:
+            batch_size: clouds of a batch; at most the clouds of the epoch.
+            augmentation: of the points and targets.
+            seed: of the epoch.
+            skip: number of batches to leave out at the start.
+            limit: number of random clouds in the epoch; None is all.
         """
         rng = np.random.default_rng(seed)
         order = rng.permutation(len(self))[:limit]
@@ -128,29 +133,33 @@ class CloudLoader:
             if number >= skip:
                 yield self._batch(order[start : start + batch_size], draw)
 
-    def _batch(self, chosen: np.ndarray, draw: AugmentationDraw | None) -> Batch:
-        points = self._points[chosen]
+    def _batch(self, indices: np.ndarray, draw: AugmentationDraw | None) -> Batch:
+        points = self._points[indices]
         if draw is not None:
             points = apply_augmentation(points, draw)
-        known = None if self._neighbours is None else self._neighbours(chosen)
-        door = {name: values[chosen] for name, values in self._targets.items()}
+        neighbours = None if self._neighbours is None else self._neighbours(indices)
+        door = {name: values[indices] for name, values in self._targets.items()}
         targets = {name: torch.from_numpy(values) for name, values in augment_targets(door, draw).items()}
         if self._parts is not None:
-            targets[PARTS] = torch.from_numpy(POINT_HEADS[PARTS].target(self._parts[chosen]))
-        return Batch(torch.from_numpy(points), torch.from_numpy(self._labels[chosen]), known, targets)
+            targets[PARTS] = torch.from_numpy(POINT_HEADS[PARTS].target(self._parts[indices]))
+        return Batch(torch.from_numpy(points), torch.from_numpy(self._labels[indices]), neighbours, targets)
 
 
-def _joined(arrays: Sequence[np.ndarray]) -> np.ndarray:
-    """Arrays behind one another; one alone is large, and not copied."""
+def _concatenate(arrays: Sequence[np.ndarray]) -> np.ndarray:
+    """Concatenate arrays; a single array is not copied, because it may be large."""
     return arrays[0] if len(arrays) == 1 else np.concatenate(arrays)
 
 
 def _load(
     dataset: PreparedDataset, sample_ids: Sequence[str], num_points: int, heads: Sequence[str]
 ) -> _Loaded:
-    """Samples of one data set; arguments and errors are those of `CloudLoader`."""
+    """Load samples of one data set; arguments and errors are those of `CloudLoader`."""
     if num_points > dataset.num_points:
-        raise ConfigError(f"{dataset.folder}: holds {dataset.num_points} points a cloud, not {num_points}")
+        raise ConfigError(
+            f"holds {dataset.num_points} points per cloud, not {num_points}",
+            path=dataset.folder,
+            field="num_points",
+        )
     indices = np.array([dataset.index_of(sample) for sample in sample_ids], dtype=np.int64)
     # A prefix of a farthest-point order is the farthest-point sample of that size.
     points = dataset.clouds[indices, :num_points]
@@ -162,28 +171,30 @@ def _load(
     return _Loaded(normalize(points), centroids_m, labels, targets, parts)
 
 
-class _KnownNeighbours:
-    """Neighbours of clouds by their numbers, searched at the first request."""
+class _NeighbourCache:
+    """Neighbours of clouds by their row numbers, searched at the first request."""
 
     def __init__(self, find: FindNeighbours, points: np.ndarray) -> None:
         self._find, self._points = find, points
         self._searched = torch.zeros(len(points), dtype=torch.bool)
-        self._kept: tuple[Tensor, ...] = ()
+        self._cache: tuple[Tensor, ...] = ()
 
-    def __call__(self, chosen: np.ndarray) -> tuple[Tensor, ...]:
-        clouds = torch.from_numpy(chosen)
+    def __call__(self, indices: np.ndarray) -> tuple[Tensor, ...]:
+        clouds = torch.from_numpy(indices)
         new = clouds[~self._searched[clouds]]
         if len(new):
             self._search(new)
-        return tuple(kept[clouds].long() for kept in self._kept)
+        return tuple(cached[clouds].long() for cached in self._cache)
 
     @torch.no_grad()
     def _search(self, new: Tensor) -> None:
-        found = self._find(torch.from_numpy(self._points[new.numpy()]))
-        if not self._kept:
+        neighbours = self._find(torch.from_numpy(self._points[new.numpy()]))
+        if not self._cache:
             count, num_points, _ = self._points.shape
-            smallest = torch.int16 if num_points <= 2**15 else torch.int32  # a million indices a cloud add up
-            self._kept = tuple(torch.empty(count, *each.shape[1:], dtype=smallest) for each in found)
-        for kept, each in zip(self._kept, found, strict=True):
-            kept[new] = each.to(kept.dtype)
+            smallest = (
+                torch.int16 if num_points <= 2**15 else torch.int32
+            )  # a cloud can have a million indices
+            self._cache = tuple(torch.empty(count, *part.shape[1:], dtype=smallest) for part in neighbours)
+        for cached, part in zip(self._cache, neighbours, strict=True):
+            cached[new] = part.to(cached.dtype)
         self._searched[new] = True

@@ -1,83 +1,79 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Five folds of 70 % training, 10 % validation and 20 % test, drawn once, written to a file and never drawn again.
+"""Five folds of 70 % training, 10 % validation and 20 % test, drawn once and saved to a file.
 
-`paper`: stratified by state x distance band x angle region, random within. The same pose in another state, and poses
-10 cm away, may be on both sides: that is the paper's way.
-
-`by-pose`: the half-ring is cut into five sectors of bearing and two rings of distance; a fold tests the inner block of
-one sector and the outer block of another. All states of a pose stay together, and poses within 0.5 m of a tested one
-are used by nobody in that fold.
-
-`by-scene`: whole scenes, which is a door in its room and all that was seen of it, stay on one side; dealt by what they
-show and from where.
-
-`all`: one "fold" that trains on every sample and tests none, for weights to be used once a recipe has been chosen.
-
-`unseen`: one "fold" that tests every sample and trains on none, for weights that were trained on something else.
+- `paper`: stratified by state, distance band and angle region, random within strata. The same pose in another state,
+  and poses 10 cm away, may be on both sides, as in the paper.
+- `by-pose`: blocks of neighbouring poses are tested, with an embargo of 0.5 m around them (`pose_blocks`).
+- `by-scene`: all samples of a scene stay on one side; stratified by kind, distance band and region.
+- `all`: one "fold" that trains on every sample, for final weights of a chosen recipe.
+- `unseen`: one "fold" that tests every sample, for weights that were trained on other data.
 """
 
 from __future__ import annotations
 
-import math
-from collections import defaultdict
+import warnings
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from scipy.spatial import cKDTree
+from numpy.typing import NDArray
 
 from doorstate._files import read_csv, write_csv
+from doorstate.dataset.pose_blocks import split_poses
 from doorstate.errors import ConfigError, DatasetError
 
 Role = Literal["train", "val", "test", "unused"]
 Row = Mapping[str, str]
+Strata = Sequence[tuple[str, ...]]
 EVERYTHING, UNSEEN = "all", "unseen"
 ONE_FOLD: Mapping[str, Role] = {EVERYTHING: "train", UNSEEN: "test"}
 PROTOCOLS = ("paper", "by-pose", "by-scene", *ONE_FOLD)
+ROLES: tuple[Role, ...] = ("train", "val", "test", "unused")
 NUM_FOLDS = 5
-EMBARGO_M = 0.5
 _TENTHS = 10
+_LEAST_SAMPLES = 3 * _TENTHS
 
 
 def draw_splits(rows: Sequence[Row], protocol: str, seed: int) -> list[dict[str, Role]]:
-    """Role of every sample in every fold.
+    """Draw the role of every sample in every fold.
 
     Returns:
         One {sample_id: role} per fold; every sample is tested in exactly one fold, under `all` in none.
 
     Raises:
         ConfigError: no such protocol.
-        DatasetError: the protocol needs poses that the data set does not have, or there are too few samples.
+        DatasetError: the rows lack poses or scenes that the protocol needs, or there are too few samples.
     """
-    if len(rows) < _TENTHS * 3:
+    if len(rows) < _LEAST_SAMPLES:
         raise DatasetError(
-            f"{len(rows)} samples are too few for {NUM_FOLDS} folds: at least {_TENTHS * 3} are needed"
+            f"{len(rows)} samples are too few for {NUM_FOLDS} folds", expected=f"at least {_LEAST_SAMPLES}"
         )
     if protocol not in PROTOCOLS:
-        raise ConfigError(f"no protocol {protocol!r}: choose one of {', '.join(PROTOCOLS)}")
+        raise ConfigError(
+            f"no protocol {protocol!r}", field="protocol", expected=f"one of {', '.join(PROTOCOLS)}"
+        )
     if protocol in ONE_FOLD:
         return [dict.fromkeys((row["sample_id"] for row in rows), ONE_FOLD[protocol])]
-    splits = {"paper": _paper, "by-pose": _by_pose, "by-scene": _by_scene}[protocol](rows, seed)
+    splits = {"paper": _by_stratum, "by-pose": _by_pose, "by-scene": _by_scene}[protocol](rows, seed)
     for fold, roles in enumerate(splits):
         for role in ("train", "val", "test"):
             if role not in roles.values():
                 raise DatasetError(
-                    f"{len(rows)} samples are too few for protocol {protocol}: nothing is left to {role} in fold {fold}"
+                    f"{len(rows)} samples are too few for protocol {protocol}: fold {fold} has none to {role}"
                 )
     return splits
 
 
 def origin(row: Row) -> str:
-    """What a learned and a tested sample may not share: the scene, whatever sensor saw it; else seed and name."""
+    """Return what a trained and a tested sample must not share: the scene, or seed and name without one."""
     return row.get("scene_id") or f"{row.get('seed', '')}/{row['sample_id']}"
 
 
-def _paper(rows: Sequence[Row], seed: int) -> list[dict[str, Role]]:
-    tenths = _deal(
-        [(row["state"], row.get("distance_band", ""), row.get("region", "")) for row in rows], seed
-    )
-    return _roles(rows, tenths)
+def _by_stratum(rows: Sequence[Row], seed: int) -> list[dict[str, Role]]:
+    strata = [(row["state"], row.get("distance_band", ""), row.get("region", "")) for row in rows]
+    return _roles(rows, _tenths(strata, seed))
 
 
 def _by_scene(rows: Sequence[Row], seed: int) -> list[dict[str, Role]]:
@@ -85,17 +81,23 @@ def _by_scene(rows: Sequence[Row], seed: int) -> list[dict[str, Role]]:
     for row in rows:
         if not row.get("scene_id"):
             raise DatasetError(
-                f"protocol by-scene needs the scene of every sample; {row['sample_id']} has none "
-                "(simulate a preset of many scenes)"
+                f"protocol by-scene needs the scene of every sample, and {row['sample_id']} has none",
+                field="scene_id",
+                hint="simulate a preset of many scenes",
             )
         kind = row.get("door_kind") or row.get("scene_kind", "")
         scenes[row["scene_id"]] = (kind, row.get("distance_band", ""), row.get("region", ""))
-    tenth = dict(zip(scenes, _deal(list(scenes.values()), seed), strict=True))
+    # Scenes are the units, so no groups are needed: StratifiedGroupKFold balances samples, not scenes.
+    tenth = dict(zip(scenes, _tenths(list(scenes.values()), seed), strict=True))
     return _roles(rows, [tenth[row["scene_id"]] for row in rows])
 
 
-def _roles(rows: Sequence[Row], tenths: Sequence[int]) -> list[dict[str, Role]]:
-    """Roles in every fold of samples that were dealt into tenths: two are tested, one validates."""
+def _by_pose(rows: Sequence[Row], seed: int) -> list[dict[str, Role]]:
+    return split_poses(rows, NUM_FOLDS, seed)
+
+
+def _roles(rows: Sequence[Row], tenths: Sequence[int] | NDArray[np.int64]) -> list[dict[str, Role]]:
+    """Return roles in every fold: two tenths of the samples are tested, one validates."""
     roles: list[dict[str, Role]] = []
     for fold in range(NUM_FOLDS):
         test = {2 * fold, 2 * fold + 1}
@@ -109,66 +111,25 @@ def _roles(rows: Sequence[Row], tenths: Sequence[int]) -> list[dict[str, Role]]:
     return roles
 
 
-def _deal(strata: Sequence[tuple[str, ...]], seed: int) -> list[int]:
-    """Deal samples into tenths like cards, stratum after stratum, so that tenths differ by one sample at most."""
-    rng = np.random.default_rng(seed)
-    members: dict[tuple[str, ...], list[int]] = defaultdict(list)
-    for index, stratum in enumerate(strata):
-        members[stratum].append(index)
-    tenth = [0] * len(strata)
-    dealt = 0
-    for stratum in sorted(members):
-        for index in rng.permutation(members[stratum]):
-            tenth[index] = dealt % _TENTHS
-            dealt += 1
+def _tenths(strata: Strata, seed: int) -> NDArray[np.int64]:
+    """Return a number from 0 to 9 for each sample; tenths differ by one sample at most, in total and per stratum."""
+    from sklearn.model_selection import StratifiedKFold  # slow to import
+
+    # StratifiedKFold needs a stratum of ten samples: small data sets are stratified by the first name alone, or not.
+    for depth in (3, 1, 0):
+        labels = np.array(["|".join(stratum[:depth]) for stratum in strata])
+        if max(Counter(labels.tolist()).values()) >= _TENTHS:
+            break
+    else:
+        raise DatasetError(f"{len(strata)} scenes are too few", expected=f"at least {_TENTHS}")
+    tenth = np.empty(len(strata), dtype=np.int64)
+    folds = StratifiedKFold(_TENTHS, shuffle=True, random_state=seed % 2**32)
+    with warnings.catch_warnings():
+        # Strata of fewer than ten samples are spread over some of the tenths, which is as even as possible.
+        warnings.filterwarnings("ignore", "The least populated class", UserWarning)
+        for number, (_, members) in enumerate(folds.split(labels, labels)):
+            tenth[members] = number
     return tenth
-
-
-def _by_pose(rows: Sequence[Row], seed: int) -> list[dict[str, Role]]:
-    poses: dict[str, tuple[float, float]] = {}
-    for row in rows:
-        try:
-            distance_m, bearing_rad = float(row["distance_m"]), math.radians(float(row["robot_angle_deg"]))
-            poses[row["pose_id"]] = (distance_m * math.cos(bearing_rad), distance_m * math.sin(bearing_rad))
-        except (KeyError, ValueError) as error:
-            raise DatasetError(
-                f"protocol by-pose needs the pose of every sample; {row['sample_id']} has none (prepare with --poses)"
-            ) from error
-    names = sorted(poses)
-    positions = np.array([poses[name] for name in names])  # (P, 2) metres
-    block = _blocks(positions)
-    roles: list[dict[str, Role]] = []
-    for fold in range(NUM_FOLDS):
-        tested = (block == 2 * fold) | (block == 2 * ((fold + 2) % NUM_FOLDS) + 1)
-        to_tested_m, _ = cKDTree(positions[tested]).query(positions)
-        near = np.asarray(to_tested_m) <= EMBARGO_M + 1e-9
-        free = np.flatnonzero(~near)
-        rng = np.random.default_rng([seed, fold])
-        # One part in eight of what may be learned from: 10 to 70 as in the paper.
-        validation = set(rng.permutation(free)[: max(1, round(len(free) / 8))].tolist())
-        role: dict[str, Role] = {}
-        for number, name in enumerate(names):
-            if tested[number]:
-                role[name] = "test"
-            elif near[number]:
-                role[name] = "unused"
-            else:
-                role[name] = "val" if number in validation else "train"
-        roles.append({row["sample_id"]: role[row["pose_id"]] for row in rows})
-    return roles
-
-
-def _blocks(positions: np.ndarray) -> np.ndarray:
-    """Number of the block of every pose: 2 x sector + ring, ten blocks of equal count; (P,)."""
-    bearing = np.arctan2(positions[:, 1], positions[:, 0])
-    distance = np.hypot(positions[:, 0], positions[:, 1])
-    sector = np.empty(len(positions), dtype=np.int64)
-    ring = np.empty(len(positions), dtype=np.int64)
-    for number, members in enumerate(np.array_split(np.lexsort((distance, bearing)), NUM_FOLDS)):
-        sector[members] = number
-        by_distance = members[np.lexsort((bearing[members], distance[members]))]
-        ring[by_distance] = np.arange(len(members)) >= len(members) // 2
-    return 2 * sector + ring
 
 
 def write_splits(path: Path, splits: Sequence[Mapping[str, Role]]) -> None:
@@ -183,21 +144,26 @@ def write_splits(path: Path, splits: Sequence[Mapping[str, Role]]) -> None:
 
 
 def read_splits(path: Path) -> list[dict[str, Role]]:
-    """Read what `write_splits` wrote.
+    """Read a file of `write_splits`.
 
     Raises:
-        DatasetError: not such a file.
+        DatasetError: the file has another form.
     """
     rows = read_csv(path)
     if not rows or "sample_id" not in rows[0] or "fold_0" not in rows[0]:
-        raise DatasetError(f"{path}: is not a file of splits")
+        raise DatasetError("is not a file of splits", path=path, expected="columns sample_id, fold_0, ...")
     splits: list[dict[str, Role]] = []
     for fold in range(len(rows[0]) - 1):
         roles: dict[str, Role] = {}
         for row in rows:
             role = row.get(f"fold_{fold}")
-            if role not in ("train", "val", "test", "unused"):
-                raise DatasetError(f"{path}: {row['sample_id']} has role {role!r} in fold {fold}")
-            roles[row["sample_id"]] = role  # type: ignore[assignment]
+            if role not in ROLES:
+                raise DatasetError(
+                    f"{row['sample_id']} has role {role!r}",
+                    path=path,
+                    field=f"fold_{fold}",
+                    expected=f"one of {', '.join(ROLES)}",
+                )
+            roles[row["sample_id"]] = role
         splits.append(roles)
     return splits

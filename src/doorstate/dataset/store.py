@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A prepared data set on disk: `dataset.json`, `manifest.csv`, `clouds.npy`, and `parts.npy` where parts are known.
+"""Prepared data sets on disk: `dataset.json`, `manifest.csv`, `clouds.npy`, and `parts.npy` for simulated ones.
 
-Of a simulated one the manifest is enough to look at it: where `dataset.json` says so, single clouds are replayed.
+A simulated data set may be stored without clouds; single clouds are then rendered from its manifest.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from pydantic import ValidationError
 from doorstate._files import read_csv, write_text
 from doorstate._models import FrozenModel
 from doorstate.clouds.preparation import CloudSpec
-from doorstate.dataset.sampled import sample_frame
+from doorstate.dataset.sampling import sample_frame
 from doorstate.errors import ConfigError, DatasetError, first_validation_error
 from doorstate.simulation.frames import Frame, replay
 from doorstate.simulation.manifest import unflatten
@@ -26,36 +26,36 @@ from doorstate.types import NO_DOOR, STATES, Indices, Points
 
 MANIFEST, CLOUDS, PARTS, DESCRIPTION = "manifest.csv", "clouds.npy", "parts.npy", "dataset.json"
 _LABELS = (*STATES, NO_DOOR)
-_KEPT_CLOUDS = 512  # of those that are not stored
+_CACHED_CLOUDS = 512
 _T = TypeVar("_T")
 
 
 class DatasetDescription(FrozenModel):
-    """What a prepared folder holds."""
+    """Contents of a prepared folder, as in `dataset.json`."""
 
     kind: Literal["simulated", "imported"]
     source: str
     num_points: int
     samples: int
     doorstate_version: str
-    clouds: Literal["stored", "replayed"] = "stored"  # replayed: from the rows of a simulated data set
-    max_depth_m: float | None = None  # what lay farther ahead was left out
-    thin: bool = False  # chosen from some rows and columns of each image, as a predictor does
+    clouds: Literal["stored", "replayed"] = "stored"  # replayed: rendered from the manifest
+    max_depth_m: float | None = None  # points farther ahead were left out
+    thin: bool = False  # sampled from some rows and columns of each image, as a predictor does
 
     @property
     def spec(self) -> CloudSpec:
-        """Preparation of its clouds."""
+        """Settings the clouds were prepared with."""
         return CloudSpec(num_points=self.num_points, thin=self.thin, max_depth_m=self.max_depth_m)
 
     def save(self, folder: Path) -> None:
-        """Write it; the folder counts as complete from here on."""
+        """Write `dataset.json`, which marks the folder as complete."""
         write_text(folder / DESCRIPTION, self.model_dump_json(indent=2) + "\n")
 
 
 class PreparedDataset:
     """Rows and clouds in the same order; clouds are memory-mapped and in farthest-point order.
 
-    Without stored clouds, as a simulated data set may be, single clouds are rendered and sampled when asked for.
+    Without stored clouds, single clouds are rendered and sampled on request.
     """
 
     def __init__(
@@ -71,7 +71,7 @@ class PreparedDataset:
         self.rows = rows
         self._clouds = clouds
         self._parts = parts
-        self._made: dict[int, tuple[Points, NDArray[np.uint8]]] = {}
+        self._sampled: dict[int, tuple[Points, NDArray[np.uint8]]] = {}
         self._rendered: dict[int, Frame] = {}
 
     def __len__(self) -> int:
@@ -79,33 +79,31 @@ class PreparedDataset:
 
     @property
     def num_points(self) -> int:
-        """Points of every cloud."""
+        """Number of points of every cloud."""
         return self.description.num_points
 
     @property
     def max_depth_m(self) -> float | None:
-        """How far ahead clouds reach, the farthest if cameras differ; None where nobody knows."""
-        known = {row.get("camera.max_depth_m", "") for row in self.rows}
-        seen_m = None if "" in known else max(map(float, known), default=None)
-        reaches_m = (seen_m, self.description.max_depth_m)
-        return min((reach_m for reach_m in reaches_m if reach_m is not None), default=None)
+        """Largest depth of the clouds, the farthest if cameras differ; None if unknown."""
+        ranges = {row.get("camera.max_depth_m", "") for row in self.rows}
+        camera_m = None if "" in ranges else max(map(float, ranges), default=None)
+        limits_m = (camera_m, self.description.max_depth_m)
+        return min((limit_m for limit_m in limits_m if limit_m is not None), default=None)
 
     @property
     def clouds(self) -> NDArray[np.float32]:
-        """(M, n, 3) metres.
+        """Clouds (M, n, 3) in metres.
 
         Raises:
-            DatasetError: only rows are stored.
+            DatasetError: clouds are not stored.
         """
         if self._clouds is None:
-            raise DatasetError(
-                f"{self.folder}: holds rows without clouds; make them with 'doorstate simulate' and 'doorstate prepare'"
-            )
+            raise DatasetError("holds rows without clouds", path=self.folder, hint="simulate and prepare it")
         return self._clouds
 
     @cached_property
     def labels(self) -> NDArray[np.int64]:
-        """(M,) class labels, doorstate.types.DoorState; 3 of a scene without a door."""
+        """Class labels (M,), values of doorstate.types.DoorState; 3 for a scene without a door."""
         return np.array([_LABELS.index(row["state"]) for row in self.rows], dtype=np.int64)
 
     @property
@@ -118,88 +116,88 @@ class PreparedDataset:
         return {row["sample_id"]: index for index, row in enumerate(self.rows)}
 
     def index_of(self, sample_id: str) -> int:
-        """Row number of a sample.
+        """Return the row number of a sample.
 
         Raises:
-            DatasetError: the data set has no such sample.
+            DatasetError: no such sample.
         """
         if sample_id not in self._index:
-            raise DatasetError(f"{self.folder}: holds no sample {sample_id!r}")
+            raise DatasetError(f"holds no sample {sample_id!r}", path=self.folder, field="sample_id")
         return self._index[sample_id]
 
     def cloud(self, index: int, num_points: int | None = None) -> Points:
-        """(n, 3) metres, sensor frame; the first `num_points` of them if given."""
+        """Return a cloud (n, 3) in metres, sensor frame; only the first `num_points` if set."""
         if self._clouds is None:
-            return self._make(index, num_points)[0].copy()
+            return self._sample(index, num_points)[0].copy()
         return np.array(self._clouds[index, :num_points])
 
     def parts(self, index: int, num_points: int | None = None) -> NDArray[np.uint8] | None:
-        """(n,) part of every point (doorstate.types.Part), or None where nobody knows."""
+        """Return the part (n,) of every point (doorstate.types.Part), or None for imported clouds."""
         if self._clouds is None:
-            return self._make(index, num_points)[1].copy()
+            return self._sample(index, num_points)[1].copy()
         return None if self._parts is None else np.array(self._parts[index, :num_points])
 
     @property
-    def knows_parts(self) -> bool:
-        """Whether the parts of all points are stored."""
+    def has_parts(self) -> bool:
+        """True if the parts of all points are stored."""
         return self._parts is not None
 
     def parts_of(self, indices: Indices, num_points: int) -> NDArray[np.uint8]:
-        """(M, n) parts of the first points of samples by number.
+        """Return the parts (M, n) of the first points of samples by row number.
 
         Raises:
-            ConfigError: nobody knows them, or only rows are stored.
+            ConfigError: parts are not stored.
         """
         if self._parts is None:
-            raise ConfigError(f"{self.folder}: holds no parts of points: leave out the head 'parts'")
+            raise ConfigError("holds no parts of points", path=self.folder, hint="leave out the head 'parts'")
         return np.array(self._parts[indices, :num_points])
 
-    def _make(self, index: int, num_points: int | None) -> tuple[Points, NDArray[np.uint8]]:
+    def _sample(self, index: int, num_points: int | None) -> tuple[Points, NDArray[np.uint8]]:
         spec = self.description.spec
         count = num_points or spec.num_points
-        if index not in self._made or len(self._made[index][0]) < count:
-            _keep(
-                self._made,
+        if index not in self._sampled or len(self._sampled[index][0]) < count:
+            _cache(
+                self._sampled,
                 index,
                 sample_frame(self._frame(index), spec.model_copy(update={"num_points": count})),
-                _KEPT_CLOUDS,
+                _CACHED_CLOUDS,
             )
-        points, parts = self._made[index]
+        points, parts = self._sampled[index]
         return points[:count], parts[:count]
 
     def _frame(self, index: int) -> Frame:
-        """The frame of a row, rendered anew; the last one is kept, for its picture and its cloud."""
+        """Render the frame of a row; the last one is cached, because picture and cloud need it."""
         if index not in self._rendered:
-            _keep(self._rendered, index, replay(unflatten(self.rows[index])), 1)
+            _cache(self._rendered, index, replay(unflatten(self.rows[index])), 1)
         return self._rendered[index]
 
     def raw_cloud(self, index: int) -> Points:
-        """(H, W, 3) metres as the sensor gives them, rendered anew; of imported clouds what is stored."""
+        """Render the cloud (H, W, 3) in metres before sampling; imported data sets return the stored cloud."""
         if self.description.kind != "simulated":
             return self.cloud(index)
         return self._frame(index).points.copy()
 
     def raw_clouds(self, count: int) -> list[Points]:
-        """`raw_cloud` of so many samples, spread over the data set."""
+        """Return `raw_cloud` for `count` samples, spread over the data set."""
         step = max(1, len(self.rows) // count)
         return [self.raw_cloud(index) for index in range(0, len(self.rows), step)[:count]]
 
     def image(self, index: int) -> NDArray[np.uint8] | None:
-        """(H, W, 3) shaded picture, rendered anew from the row; None for imported clouds."""
+        """Render a shaded picture (H, W, 3), or return None for imported clouds."""
         if self.description.kind != "simulated":
             return None
         return shade(self._frame(index).full, unflatten(self.rows[index]).camera.intrinsics())
 
 
-def _keep(kept: dict[int, _T], index: int, value: _T, most: int) -> None:
-    """Put a value among the kept ones in place of the oldest, if there are `most` already."""
-    if len(kept) >= most:
-        kept.pop(next(iter(kept)))
-    kept[index] = value
+def _cache(cache: dict[int, _T], index: int, value: _T, size: int) -> None:
+    """Add a value to a cache, which drops its oldest entry when it is full."""
+    if len(cache) >= size:
+        cache.pop(next(iter(cache)))
+    cache[index] = value
 
 
 def is_prepared(folder: Path) -> bool:
-    """Whether `folder` holds a prepared data set."""
+    """Return True if `folder` holds a prepared data set."""
     return (folder / DESCRIPTION).is_file()
 
 
@@ -219,11 +217,11 @@ def open_dataset(folder: Path) -> PreparedDataset:
     """Open a prepared data set.
 
     Raises:
-        DatasetError: missing, incomplete or inconsistent.
+        DatasetError: the folder is missing, incomplete or inconsistent.
     """
     path = folder / DESCRIPTION
     if not is_prepared(folder):
-        raise DatasetError(f"{folder}: no prepared data set here; make one with 'doorstate prepare'")
+        raise DatasetError("is no prepared data set", path=folder, hint="prepare one first")
     try:
         description = DatasetDescription.model_validate_json(path.read_text(encoding="utf-8"))
         replayed = description.clouds == "replayed"
@@ -231,24 +229,41 @@ def open_dataset(folder: Path) -> PreparedDataset:
         parts_path = folder / PARTS
         parts = np.load(parts_path, mmap_mode="r", allow_pickle=False) if parts_path.is_file() else None
     except ValidationError as error:
-        raise DatasetError(f"{path}: {first_validation_error(error)}") from error
+        raise DatasetError(first_validation_error(error), path=path) from error
     except (OSError, ValueError, EOFError) as error:
-        raise DatasetError(f"{folder}: damaged ({error}); delete it and prepare it again") from error
-    rows = read_csv(manifest_path(folder))
-    shape = (description.samples, description.num_points, 3)
-    if len(rows) != description.samples or (
-        clouds is not None and (clouds.shape != shape or clouds.dtype != np.float32)
-    ):
-        found = "no clouds" if clouds is None else f"{CLOUDS} {clouds.shape}"
-        raise DatasetError(f"{folder}: {found} and {len(rows)} manifest rows, expected {shape}")
+        raise DatasetError(
+            f"damaged ({error})", path=folder, hint="delete the folder and prepare it again"
+        ) from error
+    manifest = manifest_path(folder)
+    rows = read_csv(manifest)
+    _check(description, rows, clouds, parts, manifest)
+    return PreparedDataset(folder, description, rows, clouds, parts)
+
+
+def _check(
+    description: DatasetDescription,
+    rows: list[dict[str, str]],
+    clouds: NDArray[np.float32] | None,
+    parts: NDArray[np.uint8] | None,
+    manifest: Path,
+) -> None:
+    """Raise DatasetError if the files of a data set disagree."""
+    folder, shape = manifest.parent, (description.samples, description.num_points, 3)
+    if len(rows) != description.samples:
+        raise DatasetError(f"has {len(rows)} rows", path=manifest, expected=f"{description.samples}")
+    if clouds is not None and (clouds.shape != shape or clouds.dtype != np.float32):
+        raise DatasetError(
+            f"shape {clouds.shape}, {clouds.dtype}", path=folder / CLOUDS, expected=f"{shape}, float32"
+        )
     if parts is not None and (parts.shape != shape[:2] or parts.dtype != np.uint8):
-        raise DatasetError(f"{folder}: {PARTS} is {parts.shape}, expected {shape[:2]}")
+        raise DatasetError(
+            f"shape {parts.shape}, {parts.dtype}", path=folder / PARTS, expected=f"{shape[:2]}, uint8"
+        )
     for column in ("sample_id", "state"):
         if rows and column not in rows[0]:
-            raise DatasetError(f"{folder / MANIFEST}: has no column {column!r}")
-    unknown = {row["state"] for row in rows} - set(_LABELS)
+            raise DatasetError("column is missing", path=manifest, field=column)
+    unknown = sorted({row["state"] for row in rows} - set(_LABELS))
     if unknown:
         raise DatasetError(
-            f"{folder / MANIFEST}: unknown state {sorted(unknown)[0]!r}, use {', '.join(_LABELS)}"
+            f"no state {unknown[0]!r}", path=manifest, field="state", expected=f"one of {', '.join(_LABELS)}"
         )
-    return PreparedDataset(folder, description, rows, clouds, parts)

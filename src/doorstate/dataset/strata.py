@@ -18,7 +18,7 @@ _BAND_EDGES_M = (1.5, 2.0, 2.5, 3.0, 3.5)
 
 
 def distance_band(distance_m: float) -> str:
-    """Name of the band; a distance on an inner edge belongs to the farther band, 3.5 m to the last."""
+    """Return the name of the band; an inner edge belongs to the farther band, 3.5 m to the last."""
     if not _BAND_EDGES_M[0] <= distance_m <= _BAND_EDGES_M[-1]:
         return OUTSIDE
     inner = sum(distance_m >= edge for edge in _BAND_EDGES_M[1:-1])
@@ -26,7 +26,7 @@ def distance_band(distance_m: float) -> str:
 
 
 def region(robot_angle_deg: float) -> str:
-    """Name of the region; an angle on an inner edge belongs to the region nearer to the wall's normal."""
+    """Return the name of the region; an inner edge belongs to the region nearer to the wall's normal."""
     if not 0 <= robot_angle_deg <= 180:
         return OUTSIDE
     beyond_normal = robot_angle_deg > 90
@@ -38,5 +38,5 @@ def region(robot_angle_deg: float) -> str:
 
 
 def polar(x_m: float, y_m: float) -> tuple[float, float]:
-    """Distance (m) and angle (degrees, 0 along the wall to the left) of a robot in the door frame."""
+    """Return distance (m) and angle (degrees, 0 along the wall to the left) of a robot in the door frame."""
     return round(math.hypot(x_m, y_m), 9), round(math.degrees(math.atan2(y_m, x_m)), 9)

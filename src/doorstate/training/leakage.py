@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from doorstate.dataset.join import check_thinned_alike
+from doorstate.dataset.join import check_same_sampling
 from doorstate.dataset.loader import CloudLoader, check_states
 from doorstate.dataset.splits import Role, origin, read_splits
 from doorstate.dataset.store import PreparedDataset, open_dataset
@@ -29,7 +29,7 @@ def check_extra_datasets(experiment: Experiment, dataset: PreparedDataset) -> No
     for path in experiment.extra_train_datasets:
         extra = open_dataset(Path(path))
         check_states(extra, extra.sample_ids, experiment.heads)
-        check_thinned_alike(extra, dataset)
+        check_same_sampling(extra, dataset)
         # Loading one sample raises for missing points or targets.
         CloudLoader(extra, extra.sample_ids[:1], experiment.num_points, heads=sorted(heads))
         if shared := [row["sample_id"] for row in extra.rows if origin(row) in tested_scenes]:

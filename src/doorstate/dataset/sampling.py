@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A simulated cloud from its frame: sampled, with the part of every point."""
+"""Clouds of an exact size from raw clouds and simulated frames."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from doorstate.simulation.frames import Frame
 from doorstate.types import Points
 
 
-def exactly(points: Points, spec: CloudSpec) -> PreparedCloud:
-    """Prepare a cloud that must give all `spec.num_points` points.
+def sample_cloud(points: Points, spec: CloudSpec) -> PreparedCloud:
+    """Prepare a cloud of exactly `spec.num_points` points.
 
     Raises:
         CloudContentError: there are fewer distinct points.
     """
     prepared = prepare_cloud(points, spec)
-    if len(prepared.points) < spec.num_points:
-        found = len(prepared.points)
+    count = len(prepared.points)
+    if count < spec.num_points:
         raise CloudContentError(
-            f"too few points: {found} distinct, {spec.num_points} needed", suggestions={"points": found}
+            f"too few points: {count} distinct, {spec.num_points} needed", suggestions={"points": count}
         )
     return prepared
 
@@ -31,7 +31,7 @@ def sample_frame(frame: Frame, spec: CloudSpec) -> tuple[Points, NDArray[np.uint
     """Return points (n, 3) in metres in farthest-point order, and the part of each (doorstate.types.Part).
 
     Raises:
-        CloudContentError: the frame shows fewer distinct points.
+        CloudContentError: the frame has fewer distinct points.
     """
-    cloud, indices = exactly(frame.points, spec)
+    cloud, indices = sample_cloud(frame.points, spec)
     return cloud, frame.cut.part.reshape(-1)[indices]
