@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -73,7 +73,7 @@ def simulate(
     unknown = [kind for kind in keep or [] if kind not in RAW_KINDS]
     if unknown:
         raise ConfigError(f"--keep {unknown[0]}: expected one of {', '.join(RAW_KINDS)}")
-    kinds: Any = tuple(kind for kind in RAW_KINDS if kind in (keep or []))
+    kinds = tuple(kind for kind in RAW_KINDS if kind in (keep or []))
     settings = settings_for(preset, seed, poses, scenes, kinds, sensor)
     preparation = Preparation(out, CloudSpec(num_points=points, thin=thin, max_depth_m=max_depth))
     if prepared is None and preparation != Preparation(out):
@@ -85,18 +85,21 @@ def simulate(
         stdout.print(f"shard {shard} is in {out}; run the command without --shard to join all shards")
         return
     with progress_bar("Simulating") as progress:
-        if prepared is not None:
-            summary = simulate_prepared(settings, preparation, prepared, workers, progress)
+        summary = (
+            None
+            if prepared is None
+            else simulate_prepared(settings, preparation, prepared, workers, progress)
+        )
         rows = simulate_dataset(out, settings, workers, progress)
     _print_counts(rows)
     twins = sum(bool(row["same_image_as"]) for row in rows)
     if twins:
         stderr.print(f"{twins} frames have the same image in another state (column same_image_as)")
-    if prepared is None:
+    if prepared is None or summary is None:
         stdout.print(f"{len(rows)} samples in {out}; next: doorstate prepare {out} --out {out}-4096")
-        return
-    stdout.print(f"{len(rows)} samples in {out}")
-    print_summary(summary, prepared, points)
+    else:
+        stdout.print(f"{len(rows)} samples in {out}")
+        print_summary(summary, prepared, points)
 
 
 def _print_counts(rows: list[dict[str, str]]) -> None:

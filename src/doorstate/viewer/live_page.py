@@ -59,7 +59,7 @@ class LivePage:
         self._server.shutdown()
         self._server.server_close()
 
-    def publish(self, kind: Literal["cloud", "end"], content: Any) -> None:
+    def publish(self, kind: Literal["cloud", "end"], content: object) -> None:
         """Send an event to all browsers.
 
         Args:
