@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What colcon installs of this package."""
+"""Installation of this package by colcon."""
 
 from pathlib import Path
 

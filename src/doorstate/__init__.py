@@ -15,7 +15,8 @@ if TYPE_CHECKING:
     from doorstate.inference.gate import Gate
     from doorstate.inference.prediction import Prediction
     from doorstate.inference.predictor import Predictor
-    from doorstate.inference.stream import StateFilter, wait_for
+    from doorstate.inference.state_filter import StateFilter
+    from doorstate.inference.waiting import wait_for
     from doorstate.io.options import ReadOptions
     from doorstate.io.readers import read_cloud
     from doorstate.networks import create_network, list_networks
@@ -41,11 +42,11 @@ _HOME = {
     "Prediction": "doorstate.inference.prediction",
     "Predictor": "doorstate.inference.predictor",
     "ReadOptions": "doorstate.io.options",
-    "StateFilter": "doorstate.inference.stream",
+    "StateFilter": "doorstate.inference.state_filter",
     "create_network": "doorstate.networks",
     "list_networks": "doorstate.networks",
     "read_cloud": "doorstate.io.readers",
-    "wait_for": "doorstate.inference.stream",
+    "wait_for": "doorstate.inference.waiting",
 }
 
 

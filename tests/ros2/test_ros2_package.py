@@ -112,7 +112,7 @@ def test_the_readme_lists_every_parameter_with_its_default_and_every_value() -> 
         for name, value in listed.items()
     }
     assert {name: shown.get(name) for name in defaults} == defaults
-    for name in DoorWatch(WatchSettings(rule="depth_region")).silence(0).values:
+    for name in DoorWatch(WatchSettings(rule="depth_region")).report_silence(0).values:
         assert f"`{name}`" in README, name
 
 

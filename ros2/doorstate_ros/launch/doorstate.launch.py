@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The node with the parameters of config/doorstate.yaml, or of a file of yours, and its camera's topics."""
+"""Start the node with the parameters of config/doorstate.yaml or of another file, and the topics of a camera."""
 
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
@@ -17,7 +17,7 @@ TOPICS = {
 
 
 def generate_launch_description() -> LaunchDescription:
-    """What `ros2 launch doorstate_ros doorstate.launch.py` starts."""
+    """Return the description of the node, for `ros2 launch`."""
     parameters = PathJoinSubstitution([FindPackageShare("doorstate_ros"), "config", "doorstate.yaml"])
     return LaunchDescription(
         [
@@ -26,7 +26,7 @@ def generate_launch_description() -> LaunchDescription:
             ),
             DeclareLaunchArgument("name", default_value="doorstate", description="Name of the node"),
             *(
-                DeclareLaunchArgument(topic, default_value=default, description=f"Topic taken as {topic}")
+                DeclareLaunchArgument(topic, default_value=default, description=f"Topic for {topic}")
                 for topic, default in TOPICS.items()
             ),
             Node(
