@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -45,11 +46,21 @@ def manifest_frame(rows: Sequence[Mapping[str, str]]) -> pd.DataFrame:
     for column in ("sample_id", "state"):
         if column not in frame:
             raise DatasetError("column is missing", field=column)
+    frame = frame.where((frame != "") | (frame.columns == "sample_id"))
     for column, own in _SAME.items():
-        if own in frame and column not in frame:
-            frame[column] = frame[own]
-    for column in frame.columns.difference(["sample_id"]):
-        frame[column] = frame[column].where(frame[column] != "")
+        if own in frame:
+            frame[column] = frame[column].fillna(frame[own]) if column in frame else frame[own]
+    for column in frame.columns:
         if column.endswith(_UNITS):
             frame[column] = frame[column].map(float, na_action="ignore").astype("float64")
     return frame.set_index("sample_id", drop=False)
+
+
+def number_column(frame: pd.DataFrame, name: str) -> pd.Series[float]:
+    """Return a column of numbers, NaN throughout where the manifest does not have it."""
+    return frame[name] if name in frame else pd.Series(math.nan, index=frame.index, dtype="float64")
+
+
+def text_column(frame: pd.DataFrame, name: str) -> pd.Series[str]:
+    """Return a column of text, "" where a field is empty or the manifest does not have the column."""
+    return frame[name].fillna("") if name in frame else pd.Series("", index=frame.index, dtype="str")
