@@ -1,21 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a reader must know before believing a number: what is missing, reduced, shared or undecidable."""
+"""Caveats of a comparison: missing runs, reduced data, shared poses, undecidable frames."""
 
 from __future__ import annotations
 
 from doorstate.clouds.preparation import NUM_POINTS
 from doorstate.dataset.splits import NUM_FOLDS
-from doorstate.dataset.store import PreparedDataset
-from doorstate.evaluation.results import ComparisonResults
-from doorstate.evaluation.stratum_tables import (
-    NO_STRATA,
-    NO_TWINS,
-    decidable_ceiling,
-    has_strata,
-    is_undecidable,
-    records_twins,
-)
+from doorstate.evaluation.comparison import Results
+from doorstate.evaluation.strata import has_strata
+from doorstate.evaluation.stratum_tables import NO_STRATA, NO_TWINS
 from doorstate.evaluation.table import number
+from doorstate.evaluation.undecidable import decidable_ceiling, is_undecidable, records_twins
 
 PAPER_SAMPLES = 4059  # Kaleci & Turgut 2021: 1353 of each state
 
@@ -38,39 +32,40 @@ PROTOCOLS = {
 }
 
 
-def caveats(results: ComparisonResults, dataset: PreparedDataset) -> list[str]:
-    """List the reservations that apply to this comparison, the gravest first."""
-    comparison, notes = results.comparison, []
+def caveats(results: Results) -> list[str]:
+    """List the caveats of a comparison, the gravest first."""
+    config, manifest = results.config, results.manifest
+    notes = []
     if results.missing:
-        by_network: dict[str, list[str]] = {}
-        for network, fold in results.missing:
-            by_network.setdefault(network, []).append(str(fold))
-        names = "; ".join(f"{network} fold {', '.join(folds)}" for network, folds in by_network.items())
+        by_method: dict[str, list[str]] = {}
+        for method, fold in results.missing:
+            by_method.setdefault(method, []).append(str(fold))
+        names = "; ".join(f"{method} fold {', '.join(folds)}" for method, folds in by_method.items())
         total = len(results.runs) + len(results.missing)
         notes.append(
-            f"Partial: {len(results.missing)} of {total} runs are not finished ({names}). Networks tested on "
+            f"Partial: {len(results.missing)} of {total} runs are not finished ({names}). Methods tested on "
             "different folds are not directly comparable."
         )
-    if comparison.folds < NUM_FOLDS:
-        notes.append(f"Only {comparison.folds} of {NUM_FOLDS} folds are shown; other samples are untested.")
-    if len(dataset.rows) < PAPER_SAMPLES:
-        notes.append(f"Reduced data: {len(dataset.rows)} samples, the paper has {PAPER_SAMPLES}.")
-    if comparison.num_points < NUM_POINTS:
+    if config.folds < NUM_FOLDS:
+        notes.append(f"Only {config.folds} of {NUM_FOLDS} folds are shown; other samples are untested.")
+    if len(manifest) < PAPER_SAMPLES:
+        notes.append(f"Reduced data: {len(manifest)} samples, the paper has {PAPER_SAMPLES}.")
+    if config.num_points < NUM_POINTS:
         notes.append(
-            f"Reduced resolution: {comparison.num_points} points a cloud, the paper has {NUM_POINTS}."
+            f"Reduced resolution: {config.num_points} points a cloud, the paper has {NUM_POINTS}."
         )
-    unused = [results.role_counts(fold)["unused"] for fold in range(comparison.folds)]
+    unused = [results.role_counts(fold)["unused"] for fold in range(config.folds)]
     if any(unused):
         notes.append(
             f"In each fold up to {max(unused)} samples are neither trained on, validated on nor tested."
         )
-    if not has_strata(dataset):
+    if not has_strata(manifest):
         notes.append(NO_STRATA)
-    if not records_twins(dataset):
+    if not records_twins(manifest):
         notes.append(NO_TWINS)
-    elif undecidable := sum(is_undecidable(row) for row in dataset.rows):
+    elif undecidable := int(is_undecidable(manifest).sum()):
         notes.append(
             f"{undecidable} frames look the same in another state of their door: no single method can be "
-            f"right on more than {number(decidable_ceiling(dataset.rows))} of all samples."
+            f"right on more than {number(decidable_ceiling(manifest))} of all samples."
         )
     return notes

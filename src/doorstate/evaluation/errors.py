@@ -7,6 +7,7 @@ import pandas as pd
 
 from doorstate.evaluation.comparison import PROBABILITY_COLUMNS, Results
 from doorstate.evaluation.manifest import number_column, text_column
+from doorstate.evaluation.undecidable import is_undecidable
 from doorstate.types import PREDICTED_LABELS, STATES
 
 RANGES = ("opening_angle_deg", "distance_m", "visible_leaf_px")
@@ -63,3 +64,10 @@ def summarize_errors(results: Results) -> pd.DataFrame:
                 rows.append(row)
     ranges = [f"{name}_{end}" for name in RANGES for end in ("min", "median", "max")]
     return pd.DataFrame(rows, columns=["method", "state", "predicted", "errors", "regions", *ranges])
+
+
+def order_errors(errors: pd.DataFrame) -> pd.DataFrame:
+    """Sort rows of `Results.errors`: decidable ones first, then by falling confidence."""
+    order = errors.assign(undecidable=is_undecidable(errors), descending=-errors["confidence"])
+    order = order.sort_values(["undecidable", "descending", "sample_id"], kind="stable")
+    return errors.loc[order.index]

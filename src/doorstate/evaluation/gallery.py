@@ -1,45 +1,57 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Misclassified samples as the report shows them: cards with picture, cloud, facts and wrong answers."""
+"""Cards of misclassified samples for the report: picture, cloud, facts and wrong predictions."""
 
 from __future__ import annotations
 
 import io
-from collections import Counter, defaultdict
-from collections.abc import Callable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from itertools import groupby
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 from PIL import Image
 
 from doorstate.dataset.store import PreparedDataset
+from doorstate.evaluation.comparison import PROBABILITY_COLUMNS, Results
 from doorstate.evaluation.detections import encode_detections
+from doorstate.evaluation.errors import order_errors
 from doorstate.evaluation.pages import data_uri, encode_cloud
-from doorstate.evaluation.results import ComparisonResults, ErrorRow
-from doorstate.evaluation.stratum_tables import is_undecidable
+from doorstate.evaluation.undecidable import is_undecidable
 
-CARDS_PER_NETWORK = 16
-_SHOWN_POINTS = 2048
+CARDS_PER_METHOD = 16
+_DRAWN_POINTS = 2048
 _PICTURE_PX = (400, 300)
 
 
 @dataclass(frozen=True)
+class WrongPrediction:
+    """Prediction of one method for a sample that it misclassified."""
+
+    method: str
+    fold: int
+    predicted: str
+    confidence: float  # probability of the predicted state
+    probabilities: tuple[float, ...]  # in the order of `STATES`
+
+
+@dataclass(frozen=True)
 class Card:
-    """One sample that at least one network misclassified."""
+    """One sample that at least one method misclassified."""
 
     sample_id: str
     state: str
     undecidable: bool
     facts: tuple[str, ...]
     picture: str | None  # data URI
-    answers: tuple[ErrorRow, ...]
+    predictions: tuple[WrongPrediction, ...]
 
 
 @dataclass(frozen=True)
 class Gallery:
-    """Cards, the clouds they show (encoded for the page), and how many errors of a network are left out."""
+    """Cards, the clouds they show (encoded for the page), and the number of errors of each method left out."""
 
     cards: tuple[Card, ...]
     clouds: Mapping[str, Mapping[str, str | None]]
@@ -51,89 +63,92 @@ class Gallery:
         """Cards under headings: decidable samples by how many methods missed them, then the others."""
 
         def heading(card: Card) -> str:
-            return "Undecidable" if card.undecidable else missed_by(len(card.answers), len(self.left_out))
+            return "Undecidable" if card.undecidable else missed_by(len(card.predictions), len(self.left_out))
 
-        return [(words, list(cards)) for words, cards in groupby(self.cards, heading)]
+        return [(title, list(cards)) for title, cards in groupby(self.cards, heading)]
+
+    @property
+    def shape_names(self) -> list[str]:
+        """Names of the shapes over all clouds."""
+        by_method = (shapes for methods in self.shapes.values() for shapes in methods.values())
+        return sorted({shape["name"] for shapes in by_method for shape in shapes})
 
 
-def missed_by(some: int, methods: int) -> str:
-    """Heading of samples that so many of the methods were wrong about."""
-    return f"Missed by {some or 'none'} of {methods}"
+def missed_by(count: int, methods: int) -> str:
+    """Return the heading of samples that `count` of the methods misclassified."""
+    return f"Missed by {count or 'none'} of {methods}"
 
 
-def build_gallery(results: ComparisonResults, dataset: PreparedDataset) -> Gallery:
-    """Choose the errors to show: of each network the decidable ones it was surest of, a card for each sample.
+def build_gallery(results: Results, dataset: PreparedDataset) -> Gallery:
+    """Choose the errors to show: of each method the decidable ones of highest confidence, a card for each sample.
 
     Args:
         results: a checked comparison.
-        dataset: the prepared data set that it was trained on.
+        dataset: data set of the comparison.
     """
-    by_network: dict[str, list[ErrorRow]] = defaultdict(list)
-    by_sample: dict[str, list[ErrorRow]] = defaultdict(list)
-    for error in results.error_rows:
-        by_network[error.network].append(error)
-        by_sample[error.sample_id].append(error)
-    rows = {name: dataset.rows[dataset.index_of(name)] for name in by_sample}
-    chosen: set[str] = set()
-    for errors in by_network.values():
-        errors.sort(key=order_of_errors(dataset))
-        chosen |= {error.sample_id for error in errors[:CARDS_PER_NETWORK]}
-    order = sorted(chosen, key=lambda name: (is_undecidable(rows[name]), -len(by_sample[name]), name))
-    left_out = Counter(error.network for error in results.error_rows if error.sample_id not in chosen)
+    errors = order_errors(results.errors)
+    errors = errors.assign(undecidable=is_undecidable(errors))
+    chosen = errors.groupby("method", sort=False).head(CARDS_PER_METHOD)["sample_id"].unique()
+    kept = errors[errors["sample_id"].isin(chosen)]
+    # In the order of methods, as `Results.errors` is.
+    by_sample = dict(iter(kept.sort_index().groupby("sample_id", sort=True)))
+    order = sorted(by_sample, key=lambda name: (by_sample[name]["undecidable"].iloc[0], -len(by_sample[name])))
+    left_out = errors["method"].value_counts().sub(kept["method"].value_counts(), fill_value=0)
     return Gallery(
-        cards=tuple(_card(dataset, rows[name], tuple(by_sample[name])) for name in order),
+        cards=tuple(_card(dataset, by_sample[name]) for name in order),
         clouds={name: _encode_cloud(dataset, dataset.index_of(name)) for name in order},
-        shapes={name: _shapes(results, by_sample[name]) for name in order},
-        left_out={network: left_out[network] for network in results.networks},
+        shapes={name: _shapes(results, name, by_sample[name]["method"]) for name in order},
+        left_out={method: int(left_out.get(method, 0)) for method in results.methods},
     )
 
 
-def order_of_errors(dataset: PreparedDataset) -> Callable[[ErrorRow], tuple[bool, float, str]]:
-    """Key that sorts errors: decidable ones first, then by how sure the network was."""
-
-    def key(error: ErrorRow) -> tuple[bool, float, str]:
-        row = dataset.rows[dataset.index_of(error.sample_id)]
-        return is_undecidable(row), -error.confidence, error.sample_id
-
-    return key
-
-
-def _card(dataset: PreparedDataset, row: Mapping[str, str], answers: tuple[ErrorRow, ...]) -> Card:
-    picture = dataset.image(dataset.index_of(row["sample_id"]))
+def _card(dataset: PreparedDataset, errors: pd.DataFrame) -> Card:
+    first = errors.iloc[0]
+    picture = dataset.image(dataset.index_of(first["sample_id"]))
     return Card(
-        row["sample_id"],
-        row["state"],
-        is_undecidable(row),
-        tuple(_facts(row)),
+        first["sample_id"],
+        first["state"],
+        bool(first["undecidable"]),
+        tuple(_facts(first)),
         None if picture is None else picture_uri(picture),
-        answers,
+        tuple(
+            WrongPrediction(
+                row["method"],
+                int(row["fold"]),
+                row["predicted"],
+                float(row["confidence"]),
+                tuple(float(row[name]) for name in PROBABILITY_COLUMNS),
+            )
+            for _, row in errors.iterrows()
+        ),
     )
 
 
-def _shapes(results: ComparisonResults, errors: list[ErrorRow]) -> dict[str, list[dict[str, Any]]]:
-    found = {error.network: results.shapes(error.network, error.sample_id) for error in errors}
-    return {method: encode_detections(shapes) for method, shapes in found.items() if shapes}
+def _shapes(results: Results, sample_id: str, methods: Iterable[str]) -> dict[str, list[dict[str, Any]]]:
+    detections = {method: results.detections.get(method, {}).get(sample_id, ()) for method in methods}
+    return {method: encode_detections(shapes) for method, shapes in detections.items() if shapes}
 
 
-def _facts(row: Mapping[str, str]) -> list[str]:
-    """Say what the manifest knows; columns it lacks are passed over."""
+def _facts(row: pd.Series[Any]) -> list[str]:
+    """Word what the manifest records of a sample; missing columns are passed over."""
+    known = row.dropna()
     facts = []
-    if angle := row.get("opening_angle_deg"):
-        facts.append(f"opened {float(angle):.0f}°")
-    if distance := row.get("distance_m"):
-        band = f" (band {row['distance_band']} m)" if row.get("distance_band") else ""
-        facts.append(f"{float(distance):.2f} m away{band}")
-    if bearing := row.get("robot_angle_deg"):
-        facts.append(f"seen from {float(bearing):.0f}° ({row.get('region') or 'no region'})")
-    if leaf := row.get("visible_leaf_px"):
-        facts.append(f"{leaf} leaf pixels")
-    if twin := row.get("same_image_as"):
-        facts.append(f"same image as {twin.replace(' ', ', ')}")
+    if "opening_angle_deg" in known:
+        facts.append(f"opened {known['opening_angle_deg']:.0f}°")
+    if "distance_m" in known:
+        band = f" (band {known['distance_band']} m)" if "distance_band" in known else ""
+        facts.append(f"{known['distance_m']:.2f} m away{band}")
+    if "robot_angle_deg" in known:
+        facts.append(f"seen from {known['robot_angle_deg']:.0f}° ({known.get('region', 'no region')})")
+    if "visible_leaf_px" in known:
+        facts.append(f"{known['visible_leaf_px']:.0f} leaf pixels")
+    if "same_image_as" in known:
+        facts.append(f"same image as {known['same_image_as'].replace(' ', ', ')}")
     return facts
 
 
 def picture_uri(picture: NDArray[np.uint8]) -> str:
-    """A small JPEG of (H, W, 3) pixels as an address."""
+    """Return (H, W, 3) pixels as a small JPEG in a data URI."""
     image = Image.fromarray(picture)
     image.thumbnail(_PICTURE_PX)
     encoded = io.BytesIO()
@@ -142,4 +157,4 @@ def picture_uri(picture: NDArray[np.uint8]) -> str:
 
 
 def _encode_cloud(dataset: PreparedDataset, index: int) -> dict[str, str | None]:
-    return encode_cloud(dataset.cloud(index, _SHOWN_POINTS), dataset.parts(index, _SHOWN_POINTS))
+    return encode_cloud(dataset.cloud(index, _DRAWN_POINTS), dataset.parts(index, _DRAWN_POINTS))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One HTML file that shows a comparison and loads nothing from anywhere."""
+"""Report of a comparison: tables, figures, and one HTML page that loads nothing from anywhere."""
 
 from __future__ import annotations
 
@@ -13,146 +13,135 @@ import numpy as np
 from doorstate._files import write_text
 from doorstate.dataset.store import PreparedDataset, open_dataset
 from doorstate.evaluation.caveats import PROTOCOLS, caveats
-from doorstate.evaluation.figures import (
-    Drawing,
-    draw_dataset,
-    save_drawings,
-    write_figures,
-)
+from doorstate.evaluation.comparison import Results
+from doorstate.evaluation.figures.draw import draw_dataset_figures, draw_figures
+from doorstate.evaluation.figures.encode import save_figures
 from doorstate.evaluation.gallery import build_gallery
-from doorstate.evaluation.join import load_joined
-from doorstate.evaluation.metrics import ratio
+from doorstate.evaluation.manifest import manifest_frame
+from doorstate.evaluation.method_scores import predicted_labels
+from doorstate.evaluation.metrics import confusion, ratio
 from doorstate.evaluation.pages import data_uri, render_page
-from doorstate.evaluation.results import ComparisonResults
-from doorstate.evaluation.score_tables import answers_given, pooled_confusion
+from doorstate.evaluation.predictions import join_results, load_results
+from doorstate.evaluation.stratum_tables import dataset_tables
 from doorstate.evaluation.table import Table
-from doorstate.evaluation.tables import dataset_tables, save_tables, write_tables
+from doorstate.evaluation.tables import build_tables, save_tables
 from doorstate.evaluation.views import DETECTION_COLORS, STATE_COLORS, STATE_WORDS
 from doorstate.types import STATES
 
 
 def write_report(
-    comparison_folders: Sequence[Path],
-    out_folder: Path,
-    dataset_folder: Path | None = None,
+    folders: Sequence[Path],
+    out: Path,
+    dataset: Path | None = None,
     folds: int | None = None,
-    of_dataset: Mapping[str, Drawing] | None = None,
+    dataset_figures: Mapping[str, bytes] | None = None,
 ) -> Path:
     """Write `tables/`, `figures/` and `report.html`; the same inputs give the same bytes.
 
     Args:
-        comparison_folders: finished or partly finished; several on the same samples are shown as one.
-        out_folder: made if absent.
-        dataset_folder: its data set, if it is not where the comparison says.
-        folds: show the first so many folds only.
-        of_dataset: what `draw_dataset` gave, if it is drawn already.
+        folders: comparisons, finished or partly finished; several on the same samples are shown as one.
+        out: made if absent.
+        dataset: data set folder, if it is not where the comparison says.
+        folds: number of first folds to show; all if not given.
+        dataset_figures: output of `draw_dataset_figures`, if they are drawn already.
 
     Returns:
-        The report.
+        The page.
 
     Raises:
         RunError: the comparison cannot be used.
         DatasetError: its data set or splits cannot be used.
     """
-    results = load_joined(comparison_folders, dataset_folder, folds)
-    dataset = open_dataset(results.dataset_folder)
-    tables = write_tables(results, dataset, out_folder / "tables")
-    drawings = write_figures(results, dataset, out_folder / "figures", of_dataset)
-    report = out_folder / "report.html"
-    write_text(report, render_report(results, dataset, tables, drawings))
-    return report
+    results = join_results([load_results(folder, dataset, folds) for folder in folders])
+    return write_results_report(results, out, dataset_figures)
 
 
-def write_dataset_figures(dataset_folder: Path, out_folder: Path) -> Path:
-    """Write what can be shown of a prepared data set alone: Table 1, undecidable frames, Figures 1 and 2.
+def write_results_report(
+    results: Results, out: Path, dataset_figures: Mapping[str, bytes] | None = None
+) -> Path:
+    """Write the report of loaded results as `write_report` does."""
+    prepared = open_dataset(results.dataset_folder)
+    tables, figures = build_tables(results), draw_figures(results, prepared, dataset_figures)
+    save_tables(tables, out / "tables")
+    save_figures(figures, out / "figures")
+    page = out / "report.html"
+    write_text(page, render_report(results, prepared, tables, figures))
+    return page
+
+
+def write_dataset_report(dataset: Path, out: Path) -> Path:
+    """Write the tables and figures of a prepared data set alone: Table 1, undecidable frames, Figures 1 and 2.
 
     Args:
-        dataset_folder: a prepared data set.
-        out_folder: made if absent; gets `tables/` and `figures/`.
+        dataset: prepared data set.
+        out: made if absent; gets `tables/` and `figures/`.
 
     Returns:
-        `out_folder`.
+        `out`.
 
     Raises:
         DatasetError: the data set cannot be used.
     """
-    dataset = open_dataset(dataset_folder)
-    save_tables(dataset_tables(dataset), out_folder / "tables")
-    save_drawings(draw_dataset(dataset), out_folder / "figures")
-    return out_folder
+    prepared = open_dataset(dataset)
+    save_tables(dataset_tables(manifest_frame(prepared.rows)), out / "tables")
+    save_figures(draw_dataset_figures(prepared), out / "figures")
+    return out
 
 
 def render_report(
-    results: ComparisonResults,
-    dataset: PreparedDataset,
-    tables: Mapping[str, Table],
-    drawings: Mapping[str, Drawing],
+    results: Results, dataset: PreparedDataset, tables: Mapping[str, Table], figures: Mapping[str, bytes]
 ) -> str:
-    """Fill the template.
+    """Fill the template of the page.
 
     Args:
         results: a checked comparison.
-        dataset: the prepared data set that it was trained on.
-        tables: what `build_tables` gave.
-        drawings: what `draw_figures` gave.
+        dataset: data set of the comparison.
+        tables: output of `build_tables`.
+        figures: output of `draw_figures`.
     """
     gallery = build_gallery(results, dataset)
     return render_page(
         "report.html.j2",
         results=results,
-        comparison=results.comparison,
-        recipe=json.dumps(results.comparison.recipe, indent=2, default=str),
-        protocol=PROTOCOLS.get(results.comparison.protocol, ""),
-        notes=caveats(results, dataset),
+        config=results.config,
+        recipe=json.dumps(results.config.recipe, indent=2, default=str),
+        protocol=PROTOCOLS.get(results.config.protocol, ""),
+        caveats=caveats(results),
         facts=_facts(results, dataset),
         environment=_environment(results),
         tables=tables,
-        figures={name: _image_uri(drawing) for name, drawing in drawings.items()},
-        confusions=[(network, _confusion_cells(results, network)) for network in results.networks],
+        figures={name: data_uri(png, "image/png") for name, png in figures.items()},
+        confusions=[(method, _confusion_cells(results, method)) for method in results.methods],
         states=STATES,
         words=STATE_WORDS,
-        answers=answers_given(results),
+        labels=predicted_labels(results),
         state_colors=STATE_COLORS,
         shape_colors=DETECTION_COLORS,
-        shape_names=sorted(
-            {
-                s["name"]
-                for by_method in gallery.shapes.values()
-                for found in by_method.values()
-                for s in found
-            }
-        ),
         gallery=gallery,
         page_data={"clouds": gallery.clouds, "shapes": gallery.shapes},
     )
 
 
-def _image_uri(drawing: Drawing) -> str:
-    """Take whichever file of a figure is smaller."""
-    if len(drawing.svg) < len(drawing.png):
-        return data_uri(drawing.svg, "image/svg+xml")
-    return data_uri(drawing.png, "image/png")
-
-
-def _confusion_cells(results: ComparisonResults, network: str) -> list[list[tuple[int, float]]]:
-    """Counts with their share of the true state, row by row; a share of nothing is 0 here, it only tints."""
-    counts = pooled_confusion(results, network)[:, : len(answers_given(results))]
+def _confusion_cells(results: Results, method: str) -> list[list[tuple[int, float]]]:
+    """Return counts with their share of the true state, row by row; an undefined share, which only tints, is 0."""
+    counts = confusion(results.tested_by(method))[:, : len(predicted_labels(results))]
     shares = np.nan_to_num(ratio(counts, counts.sum(axis=1, keepdims=True)))
     return [list(zip(*pair, strict=True)) for pair in zip(counts.tolist(), shares.tolist(), strict=True)]
 
 
-def _facts(results: ComparisonResults, dataset: PreparedDataset) -> dict[str, str]:
-    comparison = results.comparison
-    states = [row["state"] for row in dataset.rows]
-    roles = [results.role_counts(fold) for fold in range(comparison.folds)]
+def _facts(results: Results, dataset: PreparedDataset) -> dict[str, str]:
+    config = results.config
+    states = results.manifest["state"].value_counts()
+    roles = [results.role_counts(fold) for fold in range(config.folds)]
     return {
-        "Networks": ", ".join(comparison.networks),
-        **({"Rules": ", ".join(comparison.rules)} if comparison.rules else {}),
+        "Networks": ", ".join(config.networks),
+        **({"Rules": ", ".join(config.rules)} if config.rules else {}),
         "Runs": f"{len(results.runs)} of {len(results.runs) + len(results.missing)}",
         "Data": f"{dataset.description.source} ({dataset.description.kind})",
-        "Samples": f"{len(states)}: " + ", ".join(f"{states.count(state)} {state}" for state in STATES),
-        "Points a cloud": str(comparison.num_points),
-        "Protocol": f"{comparison.protocol}, {comparison.folds} folds",
+        "Samples": f"{len(results.manifest)}: "
+        + ", ".join(f"{states.get(state, 0)} {state}" for state in STATES),
+        "Points a cloud": str(config.num_points),
+        "Protocol": f"{config.protocol}, {config.folds} folds",
         **{
             name: _range(count[role] for count in roles)
             for name, role in (
@@ -162,7 +151,7 @@ def _facts(results: ComparisonResults, dataset: PreparedDataset) -> dict[str, st
                 ("Unused samples a fold", "unused"),
             )
         },
-        "Seed": str(comparison.seed),
+        "Seed": str(config.seed),
     }
 
 
@@ -171,13 +160,13 @@ def _range(values: Iterable[int]) -> str:
     return str(numbers[0]) if len(numbers) == 1 else f"{numbers[0]} to {numbers[-1]}"
 
 
-def _environment(results: ComparisonResults) -> dict[str, str]:
-    """Every value that the runs recorded, once; several where runs differ."""
+def _environment(results: Results) -> dict[str, str]:
+    """Return every value that the runs recorded, once; several where runs differ."""
     values: dict[str, dict[str, None]] = {}
     for run in results.runs:
         for name, value in run.environment.items():
             values.setdefault(name, {})[_text(value)] = None
-    return {name: "; ".join(found) for name, found in sorted(values.items())}
+    return {name: "; ".join(texts) for name, texts in sorted(values.items())}
 
 
 def _text(value: Any) -> str:

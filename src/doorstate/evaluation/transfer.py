@@ -1,140 +1,79 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Trained on one thing, tested on another: macro-F1 of every pair of a transfer study."""
+"""Transfer study: macro F1 of weights trained on one data set and tested on another."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-from matplotlib.figure import Figure
+import pandas as pd
 
 from doorstate.errors import RunError
-from doorstate.evaluation.figures import encode_figures, save_drawings
-from doorstate.evaluation.metrics import scores
-from doorstate.evaluation.results import load_results
-from doorstate.evaluation.score_tables import pooled_confusion
-from doorstate.evaluation.table import Table, number
+from doorstate.evaluation.figures.encode import encode_figures, save_figures
+from doorstate.evaluation.figures.transfer import transfer_figure
+from doorstate.evaluation.metrics import macro_f1
+from doorstate.evaluation.study import Study
+from doorstate.evaluation.table import Table, label_column, number_column
 from doorstate.evaluation.tables import save_tables
-from doorstate.training.run_folder import read_json
-
-_NAN = float("nan")
 
 
-@dataclass(frozen=True)
-class TransferResults:
-    """Macro-F1 by (network, trained, tested), and how many samples of each data set were tested."""
-
-    networks: tuple[str, ...]
-    trained: tuple[str, ...]
-    tested: tuple[str, ...]
-    macro_f1: dict[tuple[str, str, str], float]
-    samples: dict[str, int]
-
-    def trainings(self, network: str) -> tuple[str, ...]:
-        """Those that the network was part of."""
-        return tuple(
-            row
-            for row in self.trained
-            if any((network, row, column) in self.macro_f1 for column in self.tested)
-        )
-
-
-def load_transfer_results(
-    folder: Path, trained: Sequence[str], tested: Sequence[str], datasets_folder: Path | None = None
-) -> TransferResults:
-    """Read the comparisons of a study; what is not there yet is left out.
+def score_transfer(study: Study, trained: Sequence[str], tested: Sequence[str]) -> pd.DataFrame:
+    """Score every pair of a study that is finished.
 
     Args:
-        folder: of the study, which holds `<trained>/<tested>/`.
+        study: has parts `<trained>/<tested>`.
         trained: names, in the order of rows.
         tested: names, in the order of columns.
-        datasets_folder: holds the data sets by the last part of their names, if they are not where comparisons say.
+
+    Returns:
+        Columns method, trained, tested (ordered categories), samples (with a door), f1 (macro).
 
     Raises:
-        RunError: nothing is there, or a comparison cannot be used.
+        RunError: no pair is finished.
     """
-    networks: dict[str, None] = {}
-    macro_f1: dict[tuple[str, str, str], float] = {}
-    samples: dict[str, int] = {}
+    rows = []
     for row in trained:
         for column in tested:
-            cell = folder / row / column
-            if not any(cell.glob("runs/*/*/predictions.csv")):
-                continue
-            dataset = Path(read_json(cell / "comparison.json")["dataset"]).name
-            results = load_results(cell, None if datasets_folder is None else datasets_folder / dataset)
-            for network in results.networks:
-                networks[network] = None
-                confusion = pooled_confusion(results, network)
-                macro_f1[network, row, column] = float(scores(confusion).macro.f1)
-                samples[column] = int(confusion.sum())
-    if not networks:
-        raise RunError(f"{folder}: holds no finished part of a transfer study")
-    return TransferResults(tuple(networks), tuple(trained), tuple(tested), macro_f1, samples)
+            results = study.parts.get(f"{row}/{column}")
+            for method in results.methods if results is not None else ():
+                predictions = results.tested_by(method)
+                rows.append((method, row, column, len(predictions), macro_f1(predictions)))
+    if not rows:
+        raise RunError("holds no finished part of a transfer study", field="parts")
+    frame = pd.DataFrame(rows, columns=["method", "trained", "tested", "samples", "f1"])
+    methods = list(dict.fromkeys(frame["method"]))
+    for name, order in (("method", methods), ("trained", list(trained)), ("tested", list(tested))):
+        frame[name] = pd.Categorical(frame[name], order, ordered=True)
+    return frame
 
 
-def transfer_table(results: TransferResults) -> Table:
-    """A line for each network and training, a column for each data set."""
-    rows = tuple(
-        (
-            network,
-            row,
-            *(number(results.macro_f1.get((network, row, column), _NAN)) for column in results.tested),
-        )
-        for network in results.networks
-        for row in results.trainings(network)
-    )
-    counts = ", ".join(
-        f"{name} {results.samples[name]}" for name in results.tested if name in results.samples
-    )
-    return Table(
+def transfer_grid(scores: pd.DataFrame) -> pd.DataFrame:
+    """Lay out `score_transfer` as a grid: a row for each method and training, a column for each tested data set."""
+    grid = scores.pivot(index=["method", "trained"], columns="tested", values="f1")
+    grid = grid.reindex(columns=list(scores["tested"].cat.categories)).sort_index()
+    return grid.rename_axis(columns=None).reset_index()
+
+
+def transfer_table(scores: pd.DataFrame) -> Table:
+    """Build the table of `score_transfer`."""
+    samples = scores.groupby("tested", observed=True)["samples"].last()
+    counts = ", ".join(f"{name} {count}" for name, count in samples.items())
+    return Table.from_frame(
         "Macro F1 by what was trained on and what was tested on",
-        ("network", "trained on", *results.tested),
-        rows,
-        "A column tests the same samples of all weights; none of the trainings has seen their scenes. Samples with a "
-        f"door: {counts}.",
-        text_columns=2,
+        transfer_grid(scores),
+        (
+            label_column("method"),
+            label_column("trained", "trained on"),
+            *(number_column(str(name)) for name in scores["tested"].cat.categories),
+        ),
+        "A column tests the same samples with all weights; none of the trainings has seen their scenes. Samples with "
+        f"a door: {counts}.",
     )
 
 
-def transfer_figure(results: TransferResults) -> Figure:
-    """One grid of numbers for each network, the darker the better."""
-    lines = [len(results.trainings(network)) for network in results.networks]
-    width = 0.75 * len(results.tested) + 1.6
-    height = 0.36 * sum(lines) + 0.5 * len(lines) + 0.9
-    figure = Figure(figsize=(width, height), layout="constrained")
-    axes = figure.subplots(len(lines), 1, squeeze=False, sharex=True, height_ratios=lines)[:, 0]
-    for axis, network in zip(axes, results.networks, strict=True):
-        grid = np.array(
-            [
-                [results.macro_f1.get((network, row, column), _NAN) for column in results.tested]
-                for row in results.trainings(network)
-            ]
-        )
-        axis.imshow(grid, cmap="Blues", vmin=0.3, vmax=1.0, aspect="auto")
-        for (row, column), value in np.ndenumerate(grid):
-            axis.text(
-                column,
-                row,
-                number(value, 3),
-                ha="center",
-                va="center",
-                fontsize=8,
-                color="white" if value > 0.75 else "black",
-            )
-        axis.set_yticks(range(len(grid)), results.trainings(network))
-        axis.set_ylabel(network)
-        axis.spines[:].set_visible(False)
-        axis.tick_params(length=0)
-    axes[-1].set_xticks(range(len(results.tested)), results.tested, rotation=30, ha="right")
-    axes[-1].set_xlabel("tested on")
-    return figure
-
-
-def write_transfer(results: TransferResults, out_folder: Path) -> Path:
+def write_transfer(scores: pd.DataFrame, out: Path) -> Path:
     """Write the table and the figure of a study into `tables/` and `figures/` of a folder, made if absent."""
-    save_tables({"transfer": transfer_table(results)}, out_folder / "tables")
-    save_drawings(encode_figures({"transfer": transfer_figure(results)}), out_folder / "figures")
-    return out_folder
+    save_tables({"transfer": transfer_table(scores)}, out / "tables")
+    figure = transfer_figure(transfer_grid(scores))
+    save_figures(encode_figures({"transfer": figure}), out / "figures")
+    return out

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How clouds, states, regions and axes look in every picture: colours and one oblique view."""
+"""Colours of states, regions and parts, the oblique view of clouds, and the style of axes, in every picture."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ REGION_COLORS = {
     "yellow": "#F0E442",
     "blue": "#0072B2",
 }
-STATE_WORDS = {"closed": "closed", "semi_open": "semi-open", "open": "open", ABSTAINED: "no answer"}
+STATE_WORDS = {"closed": "closed", "semi_open": "semi-open", "open": "open", ABSTAINED: "abstained"}
 STATE_COLORS = {"closed": "#0072B2", "semi_open": "#E69F00", "open": "#CC79A7"}
 NETWORK_COLORS = {
     "pointnet": "#0072B2",
@@ -37,7 +37,7 @@ NETWORK_COLORS = {
     "pointcnn": "#CC79A7",
     "point2sequence": "#E69F00",
 }
-# What rules find, over clouds in the colours of their parts.
+# Detections of rules, over clouds in the colours of their parts.
 DETECTION_COLORS = {
     "wall": "#0072B2",
     "leaf": "#B3202C",
@@ -70,13 +70,13 @@ def outside_legend(
     labels: Sequence[str],
     place: Literal["outside upper right", "outside lower center"],
 ) -> None:
-    """A legend outside the axes, in as many columns as the figure has room for: that of one network is narrow.
+    """Add a legend outside the axes, in as many columns as the figure has room for.
 
     Args:
         figure: with constrained layout.
-        handles: one for each label.
-        labels: in default font size.
-        place: as matplotlib calls it.
+        handles: artists, one for each label.
+        labels: texts in the default font size.
+        place: location of the legend in matplotlib.
     """
     column_in = _LETTER_IN * max(map(len, labels)) + _MARK_IN
     columns = min(len(labels), max(1, int(figure.get_figwidth() / column_in)))

@@ -4,64 +4,63 @@
 from __future__ import annotations
 
 import textwrap
-from collections import defaultdict
 from collections.abc import Sequence
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from doorstate.dataset.store import PreparedDataset
+from doorstate.evaluation.comparison import Results
 from doorstate.evaluation.detections import draw_detections
-from doorstate.evaluation.gallery import order_of_errors
-from doorstate.evaluation.results import ComparisonResults, ErrorRow
-from doorstate.evaluation.samples_figure import draw_cloud, part_legend
+from doorstate.evaluation.errors import order_errors
+from doorstate.evaluation.figures.samples import draw_cloud, part_legend
 from doorstate.evaluation.views import STATE_WORDS, picture_axes
 
 _COLUMNS = 5
 _TITLE_LETTERS = 40  # of a line as wide as a picture
 
 
-def surest_errors_figure(results: ComparisonResults, dataset: PreparedDataset) -> Figure | None:
-    """Figure 3: a line for each network with the errors it was surest of; None without errors."""
-    by_network = defaultdict(list)
-    for error in sorted(results.error_rows, key=order_of_errors(dataset)):
-        by_network[error.network].append(error)
-    lines = [(network, by_network[network][:_COLUMNS]) for network in results.networks if by_network[network]]
+def surest_errors_figure(results: Results, dataset: PreparedDataset) -> Figure | None:
+    """Draw Figure 3: a line for each method with its errors of highest confidence; None without errors."""
+    errors = order_errors(results.errors)
+    lines = [(method, errors[errors["method"] == method]) for method in results.methods]
+    lines = [(method, of_method) for method, of_method in lines if len(of_method)]
     if not lines:
         return None
     figure, axes = _grid(len(lines))
-    for line, (network, errors) in enumerate(lines):
-        axes[2 * line][0].set_ylabel(f"{network}\n{len(by_network[network])} errors", fontsize=10)
-        for column, error in enumerate(errors):
+    for line, (method, of_method) in enumerate(lines):
+        axes[2 * line][0].set_ylabel(f"{method}\n{len(of_method)} errors", fontsize=10)
+        for column, error in enumerate(of_method.head(_COLUMNS).itertuples()):
             title = f"{STATE_WORDS[error.state]} as {STATE_WORDS[error.predicted]}, {error.confidence:.2f}"
-            _draw(axes[2 * line][column], axes[2 * line + 1][column], dataset, error, title)
-            draw_detections(axes[2 * line + 1][column], results.shapes(network, error.sample_id))
-    part_legend(figure, dataset, [dataset.index_of(e.sample_id) for _, errors in lines for e in errors])
+            _draw(axes[2 * line][column], axes[2 * line + 1][column], dataset, error.sample_id, title)
+            shapes = results.detections.get(method, {}).get(error.sample_id, ())
+            draw_detections(axes[2 * line + 1][column], shapes)
+    drawn = [sample for _, of_method in lines for sample in of_method["sample_id"].head(_COLUMNS)]
+    part_legend(figure, dataset, map(dataset.index_of, drawn))
     return figure
 
 
-def common_errors_figure(results: ComparisonResults, dataset: PreparedDataset) -> Figure | None:
-    """Figure 4: the samples that most networks missed, at least two; None where there are none."""
-    by_sample: dict[str, list[ErrorRow]] = defaultdict(list)
-    for error in results.error_rows:
-        by_sample[error.sample_id].append(error)
-    shared = sorted((e for e in by_sample.values() if len(e) > 1), key=lambda e: (-len(e), e[0].sample_id))
-    shown = shared[: 2 * _COLUMNS]
-    if not shown:
+def common_errors_figure(results: Results, dataset: PreparedDataset) -> Figure | None:
+    """Draw Figure 4: the samples that most methods misclassified, at least two; None where there are none."""
+    by_sample = [errors for _, errors in results.errors.groupby("sample_id", sort=True)]
+    shared = sorted((errors for errors in by_sample if len(errors) > 1), key=lambda errors: -len(errors))
+    drawn = shared[: 2 * _COLUMNS]
+    if not drawn:
         return None
-    figure, axes = _grid(-(-len(shown) // _COLUMNS))
-    for place, errors in enumerate(shown):
+    figure, axes = _grid(-(-len(drawn) // _COLUMNS))
+    for place, errors in enumerate(drawn):
         line, column = divmod(place, _COLUMNS)
-        said = sorted({STATE_WORDS[error.predicted] for error in errors})
-        names = textwrap.fill(f"by {', '.join(each.network for each in errors)}", _TITLE_LETTERS)
-        title = f"{STATE_WORDS[errors[0].state]} as {' or '.join(said)}\n{names}"
-        _draw(axes[2 * line][column], axes[2 * line + 1][column], dataset, errors[0], title)
-    part_legend(figure, dataset, [dataset.index_of(errors[0].sample_id) for errors in shown])
+        first = errors.iloc[0]
+        labels = sorted({STATE_WORDS[label] for label in errors["predicted"]})
+        names = textwrap.fill(f"by {', '.join(errors['method'])}", _TITLE_LETTERS)
+        title = f"{STATE_WORDS[first['state']]} as {' or '.join(labels)}\n{names}"
+        _draw(axes[2 * line][column], axes[2 * line + 1][column], dataset, first["sample_id"], title)
+    part_legend(figure, dataset, [dataset.index_of(errors["sample_id"].iloc[0]) for errors in drawn])
     return figure
 
 
 def _grid(lines: int) -> tuple[Figure, Sequence[Sequence[Axes]]]:
-    """Pairs of lines, pictures above clouds."""
+    """Return a figure with pairs of lines, pictures above clouds."""
     figure = Figure(figsize=(2.5 * _COLUMNS + 0.3, 3.9 * lines), layout="constrained")
     axes = figure.subplots(2 * lines, _COLUMNS, squeeze=False)
     for axis in axes.ravel():
@@ -69,8 +68,8 @@ def _grid(lines: int) -> tuple[Figure, Sequence[Sequence[Axes]]]:
     return figure, axes.tolist()
 
 
-def _draw(picture: Axes, cloud: Axes, dataset: PreparedDataset, error: ErrorRow, title: str) -> None:
-    index = dataset.index_of(error.sample_id)
+def _draw(picture: Axes, cloud: Axes, dataset: PreparedDataset, sample_id: str, title: str) -> None:
+    index = dataset.index_of(sample_id)
     image = dataset.image(index)
     if image is not None:
         picture.imshow(image[::2, ::2], interpolation="none")

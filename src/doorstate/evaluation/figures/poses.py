@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Plan views in the door frame: where the robot stood (the paper's Figure 1) and where networks erred."""
+"""Plan views in the door frame: poses of the robot (the paper's Figure 1) and of misclassified samples."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
@@ -14,11 +14,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
-from doorstate.dataset.store import PreparedDataset
 from doorstate.dataset.strata import REGIONS
 from doorstate.evaluation.metrics import Floats
-from doorstate.evaluation.results import ComparisonResults
-from doorstate.evaluation.stratum_tables import is_undecidable
+from doorstate.evaluation.comparison import Results
+from doorstate.evaluation.undecidable import is_undecidable
 from doorstate.evaluation.views import REGION_COLORS, STATE_COLORS, STATE_WORDS, outside_legend
 from doorstate.simulation.manifest import unflatten
 from doorstate.simulation.scene import Door, Opening
@@ -32,23 +31,22 @@ _PLATE = {"facecolor": "white", "edgecolor": "none", "pad": 0.8}
 _MARKERS = {"closed": "s", "semi_open": "^", "open": "o"}
 
 
-def poses_figure(dataset: PreparedDataset) -> Figure | None:
-    """Figure 1: robot poses by region, distance rings, and the door; None for data without poses."""
-    rows = _posed_rows(dataset)
-    if not rows:
+def poses_figure(manifest: pd.DataFrame) -> Figure | None:
+    """Draw Figure 1: robot poses by region, distance rings, and the door; None for data without poses."""
+    posed = _posed(manifest)
+    if posed.empty:
         return None
-    poses = {(row["x_m"], row["y_m"], row["heading_deg"]): row for row in rows}
-    position = _positions(list(poses.values()))
-    heading_rad = np.radians([float(row["heading_deg"]) for row in poses.values()])
-    region = np.array([row["region"] for row in poses.values()])
+    poses = posed.drop_duplicates(["x_m", "y_m", "heading_deg"])
+    position = _positions(poses)
+    heading_rad = np.radians(poses["heading_deg"].to_numpy(dtype=np.float64))
     figure = Figure(figsize=(9.0, 5.0), layout="constrained")
     axis = figure.subplots()
-    _draw_ground(axis, _door_of(dataset))
+    _draw_ground(axis, _door_of(manifest))
     ahead = position + 0.07 * np.stack([np.cos(heading_rad), np.sin(heading_rad)], axis=1)
     for name, color in REGION_COLORS.items():
-        inside = region == name
-        looks = np.stack([position[inside], ahead[inside]], axis=1)  # (n, 2, 2)
-        axis.add_collection(LineCollection(list(looks), colors=_INK, linewidths=0.4, alpha=0.7, zorder=3))
+        inside = (poses["region"] == name).to_numpy()
+        headings = np.stack([position[inside], ahead[inside]], axis=1)  # (n, 2, 2)
+        axis.add_collection(LineCollection(list(headings), colors=_INK, linewidths=0.4, alpha=0.7, zorder=3))
         axis.scatter(
             position[inside, 0],
             position[inside, 1],
@@ -65,40 +63,37 @@ def poses_figure(dataset: PreparedDataset) -> Figure | None:
     return figure
 
 
-def error_map(results: ComparisonResults, dataset: PreparedDataset) -> Figure | None:
-    """Where each network's misclassified samples were taken; None without poses or without errors."""
-    if not _posed_rows(dataset) or not results.error_rows:
+def errors_figure(results: Results) -> Figure | None:
+    """Draw the poses of each method's misclassified samples; None without poses or without errors."""
+    posed, errors = _posed(results.manifest), results.errors
+    if posed.empty or errors.empty:
         return None
-    networks = results.networks
-    columns = min(3, len(networks))
-    lines = math.ceil(len(networks) / columns)
+    methods = results.methods
+    columns = min(3, len(methods))
+    lines = math.ceil(len(methods) / columns)
     figure = Figure(figsize=(4.2 * columns, 2.4 * lines + 0.4), layout="constrained")
     axes = figure.subplots(lines, columns, squeeze=False).ravel()
-    everywhere = np.unique(_positions(_posed_rows(dataset)), axis=0)
-    for axis, network in zip(axes, networks, strict=False):
-        wrong = [
-            dataset.rows[dataset.index_of(e.sample_id)] for e in results.error_rows if e.network == network
-        ]
+    everywhere = np.unique(_positions(posed), axis=0)
+    undecidable = is_undecidable(errors)
+    for axis, method in zip(axes, methods, strict=False):
         axis.scatter(*everywhere.T, s=2, color=_FAINT, linewidths=0, rasterized=True)
-        _draw_ground(axis, _door_of(dataset), lettering=False)
+        _draw_ground(axis, _door_of(results.manifest), lettering=False)
+        of_method = errors["method"] == method
         for state in STATES:
-            for undecidable in (False, True):
-                chosen = [r for r in wrong if r["state"] == state and is_undecidable(r) == undecidable]
-                face = "none" if undecidable else STATE_COLORS[state]
-                edge = STATE_COLORS[state] if undecidable else _INK
-                points = _positions([row for row in chosen if row.get("x_m")])
+            for hollow in (False, True):
+                chosen = of_method & (errors["state"] == state) & (undecidable == hollow) & errors["x_m"].notna()
                 axis.scatter(
-                    *points.T,
+                    *_positions(errors[chosen]).T,
                     s=26,
                     marker=_MARKERS[state],
-                    facecolors=face,
-                    edgecolors=edge,
+                    facecolors="none" if hollow else STATE_COLORS[state],
+                    edgecolors=STATE_COLORS[state] if hollow else _INK,
                     linewidths=0.7,
                     zorder=5,
                 )
-        axis.set_title(f"{network}: {len(wrong)} misclassified", fontsize=10)
+        axis.set_title(f"{method}: {int(of_method.sum())} misclassified", fontsize=10)
         axis.set_axis_off()
-    for axis in axes[len(networks) :]:
+    for axis in axes[len(methods) :]:
         axis.set_axis_off()
     handles = [
         Line2D([], [], linestyle="", marker=_MARKERS[state], color=STATE_COLORS[state], markeredgecolor=_INK)
@@ -110,20 +105,24 @@ def error_map(results: ComparisonResults, dataset: PreparedDataset) -> Figure | 
     return figure
 
 
-def _door_of(dataset: PreparedDataset) -> Door:
+def _door_of(manifest: pd.DataFrame) -> Door:
     """Return the door that all samples of a simulated data set show; for other data sets, the default door."""
-    first = dataset.rows[0]
-    shows_one_scene = first.get("scene") and not first.get("scene_id")
-    return (unflatten(first).scene.door if shows_one_scene else None) or Door()
+    if "scene" not in manifest or "scene_id" in manifest:
+        return Door()
+    first = {str(name): "" if value != value else str(value) for name, value in manifest.iloc[0].items()}
+    return (unflatten(first).scene.door if first["scene"] else None) or Door()
 
 
-def _posed_rows(dataset: PreparedDataset) -> list[dict[str, str]]:
-    return [row for row in dataset.rows if all(row.get(name) for name in _POSE_COLUMNS)]
+def _posed(manifest: pd.DataFrame) -> pd.DataFrame:
+    """Return the rows with a pose."""
+    if not set(_POSE_COLUMNS) <= set(manifest):
+        return manifest.iloc[:0]
+    return manifest.dropna(subset=list(_POSE_COLUMNS))
 
 
-def _positions(rows: Sequence[dict[str, str]]) -> Floats:
-    """(N, 2) metres in the door frame."""
-    return np.array([(float(row["x_m"]), float(row["y_m"])) for row in rows], dtype=np.float64).reshape(-1, 2)
+def _positions(rows: pd.DataFrame) -> Floats:
+    """Return (N, 2) metres in the door frame."""
+    return rows[["x_m", "y_m"]].to_numpy(dtype=np.float64)
 
 
 def _draw_ground(axis: Axes, door: Door, lettering: bool = True) -> None:

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -13,7 +14,9 @@ from numpy.typing import NDArray
 
 from doorstate.dataset.store import PreparedDataset
 from doorstate.dataset.strata import REGIONS
-from doorstate.evaluation.stratum_tables import has_strata, is_undecidable
+from doorstate.evaluation.manifest import manifest_frame
+from doorstate.evaluation.strata import has_strata
+from doorstate.evaluation.undecidable import is_undecidable
 from doorstate.evaluation.views import (
     PART_COLORS,
     REGION_COLORS,
@@ -26,13 +29,14 @@ from doorstate.evaluation.views import (
 from doorstate.types import STATES, Part
 
 _MIDDLE_M = 2.25
-_SHOWN_POINTS = 2048
+_DRAWN_POINTS = 2048
 
 
 def samples_figure(dataset: PreparedDataset) -> Figure:
-    """Figure 2: one sample of each state in each region, or one of each state where regions are unknown."""
-    regions: Sequence[str] = tuple(REGIONS) if has_strata(dataset) else ("",)
-    chosen = [[_typical_sample(dataset, state, region) for region in regions] for state in STATES]
+    """Draw Figure 2: one sample of each state in each region, or one of each state where regions are unknown."""
+    manifest = manifest_frame(dataset.rows)
+    regions: Sequence[str] = tuple(REGIONS) if has_strata(manifest) else ("",)
+    chosen = [[_typical_sample(manifest, state, region) for region in regions] for state in STATES]
     indices = [index for line in chosen for index in line if index is not None]
     pictures = {index: dataset.image(index) for index in indices}
     lines_per_state = 2 if any(picture is not None for picture in pictures.values()) else 1
@@ -77,40 +81,34 @@ def samples_figure(dataset: PreparedDataset) -> Figure:
     return figure
 
 
-def _typical_sample(dataset: PreparedDataset, state: str, region: str) -> int | None:
-    """Index of a decidable sample near the middle of a region; without regions the first of the state."""
-    rows = [
-        (index, row)
-        for index, row in enumerate(dataset.rows)
-        if row["state"] == state and (not region or row.get("region") == region)
-    ]
-    if not rows:
+def _typical_sample(manifest: pd.DataFrame, state: str, region: str) -> int | None:
+    """Return the index of a decidable sample near the middle of a region; without regions the first of the state."""
+    of_state = manifest["state"] == state
+    chosen = manifest[of_state & (manifest["region"] == region)] if region else manifest[of_state]
+    if chosen.empty:
         return None
     if not region:
-        return rows[0][0]
+        return int(manifest.index.get_loc(chosen.index[0]))
     low, high = REGIONS[region]
-
-    def distance_from_typical(row: dict[str, str]) -> float:
-        off_angle = abs(float(row["robot_angle_deg"]) - (low + high) / 2) / (high - low)
-        return off_angle + abs(float(row["distance_m"]) - _MIDDLE_M)
-
-    return min(rows, key=lambda pair: (is_undecidable(pair[1]), distance_from_typical(pair[1])))[0]
+    off_angle = (chosen["robot_angle_deg"] - (low + high) / 2).abs() / (high - low)
+    distance = off_angle + (chosen["distance_m"] - _MIDDLE_M).abs()
+    order = pd.DataFrame({"undecidable": is_undecidable(chosen), "distance": distance})
+    return int(manifest.index.get_loc(order.sort_values(["undecidable", "distance"], kind="stable").index[0]))
 
 
-def _shown_parts(dataset: PreparedDataset, index: int) -> NDArray[np.uint8]:
-    """Parts of the shown points; empty where they are unknown."""
-    parts = dataset.parts(index, _SHOWN_POINTS)
+def _drawn_parts(dataset: PreparedDataset, index: int) -> NDArray[np.uint8]:
+    """Return the parts of the drawn points; empty where they are unknown."""
+    parts = dataset.parts(index, _DRAWN_POINTS)
     return np.empty(0, np.uint8) if parts is None else parts
 
 
 def draw_cloud(axis: Axes, dataset: PreparedDataset, index: int) -> None:
     """Draw a sample's cloud, seen from above and beside, with its opening angle and distance below."""
-    points, parts = dataset.cloud(index, _SHOWN_POINTS), _shown_parts(dataset, index)
+    points, parts = dataset.cloud(index, _DRAWN_POINTS), _drawn_parts(dataset, index)
     row = dataset.rows[index]
     colors = point_colors(points, parts if len(parts) else None)
     screen, order = oblique_view(points)
-    # Rasterised: thousands of vector markers would make the SVG slow to open.
-    axis.scatter(screen[order, 0], screen[order, 1], s=1.2, c=colors[order], linewidths=0, rasterized=True)
+    axis.scatter(screen[order, 0], screen[order, 1], s=1.2, c=colors[order], linewidths=0)
     axis.set_aspect("equal")
     angle, distance = row.get("opening_angle_deg"), row.get("distance_m")
     facts = [
@@ -121,8 +119,8 @@ def draw_cloud(axis: Axes, dataset: PreparedDataset, index: int) -> None:
 
 
 def part_legend(figure: Figure, dataset: PreparedDataset, indices: Iterable[int]) -> None:
-    """Say below the figure what the colours of these samples' clouds are; nothing where parts are unknown."""
-    seen = sorted({part for index in indices for part in _shown_parts(dataset, index).tolist()})
+    """Add a legend of the parts in these samples' clouds below the figure; none where parts are unknown."""
+    seen = sorted({part for index in indices for part in _drawn_parts(dataset, index).tolist()})
     if seen:
         handles = [Line2D([], [], marker="o", linestyle="", color=PART_COLORS[Part(part)]) for part in seen]
         names = [Part(part).name.lower() for part in seen]

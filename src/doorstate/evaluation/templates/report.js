@@ -3,17 +3,17 @@
   const { data } = clouds;
   const LIVE_AT_ONCE = 4; // browsers drop the oldest WebGL contexts at about eight
 
-  // ---- network filters -------------------------------------------------------------------------------------
+  // ---- method filters -------------------------------------------------------------------------------------
   for (const group of document.querySelectorAll(".chips")) {
     const target = document.getElementById(group.dataset.target);
-    const choose = (network) => {
+    const choose = (method) => {
       for (const button of group.children) {
-        button.setAttribute("aria-pressed", String(button.dataset.choice === network));
+        button.setAttribute("aria-pressed", String(button.dataset.choice === method));
       }
-      for (const item of target.querySelectorAll("tr[data-network], .card, .answers li")) {
-        item.hidden = network !== "" && !item.dataset.network.split(" ").includes(network);
+      for (const item of target.querySelectorAll("tr[data-method], .card, .predictions li")) {
+        item.hidden = method !== "" && !item.dataset.method.split(" ").includes(method);
       }
-      target.classList.toggle("single", network !== "");
+      target.classList.toggle("single", method !== "");
     };
     group.addEventListener("click", (event) => {
       const button = event.target.closest("button");
@@ -25,7 +25,7 @@
   // ---- clouds ----------------------------------------------------------------------------------------------
   const decode = (sample) => clouds.decode(data.clouds[sample]);
 
-  // What rules found in a sample: [method, { name, points }] in the order of the answers.
+  // Detections of rules in a sample: [method, { name, points }] in the order of the predictions.
   const shapesOf = (sample) =>
     Object.entries(data.shapes[sample]).flatMap(([method, shapes]) => shapes.map((shape) => [method, shape]));
 
@@ -40,7 +40,7 @@
   }, { rootMargin: "300px" });
   document.querySelectorAll(".cloud canvas").forEach((canvas) => whenSeen.observe(canvas));
 
-  // ---- 3D, made when asked for -----------------------------------------------------------------------------
+  // ---- 3D, made on demand -----------------------------------------------------------------------------
   const live = [];
 
   function close(plot) {
@@ -52,8 +52,8 @@
   function open(button) {
     const { sample } = button.closest(".card").dataset;
     const cloud = decode(sample);
-    const found = shapesOf(sample).map(([method, shape]) => clouds.shape(shape, `${method}: ${shape.name}`));
-    const traces = [...(cloud.parts ? clouds.byPart(cloud) : clouds.byHeight(cloud)), clouds.camera(), ...found];
+    const detections = shapesOf(sample).map(([method, shape]) => clouds.shape(shape, `${method}: ${shape.name}`));
+    const traces = [...(cloud.parts ? clouds.byPart(cloud) : clouds.byHeight(cloud)), clouds.camera(), ...detections];
     const plot = document.createElement("div");
     plot.className = "live";
     button.after(plot);
