@@ -4,23 +4,13 @@
 from __future__ import annotations
 
 from doorstate.evaluation.comparison import Results
-from doorstate.evaluation.heads import PARTS, score_four_labels, score_heads, score_parts, score_presence
+from doorstate.evaluation.heads import PART_NAMES, score_four_labels, score_heads, score_parts, score_presence
 from doorstate.evaluation.table import Column, Table, count_column, label_column, number_column
+from doorstate.networks.heads import HEADS
 from doorstate.types import NO_DOOR, STATES
 
 _METHOD = label_column("method")
-_ERRORS = (
-    number_column("door_auroc", "door, AUROC"),
-    number_column("angle_error_semi_open_deg", "opening angle, semi-open: mean error, °", 1),
-    number_column("angle_error_open_deg", "open", 1),
-    number_column("hinge_accuracy", "hinge side"),
-    number_column("hinge_accuracy_not_closed", "of doors not closed"),
-    number_column("position_error_median_m", "frame position: median error, m", 3),
-    number_column("position_error_p90_m", "90th percentile", 3),
-    number_column("yaw_error_median_deg", "yaw: median error, °", 1),
-    number_column("opening_width_error_m", "opening width: mean error, m", 3),
-    number_column("passable_width_error_m", "passable width: mean error, m", 3),
-)
+_METRICS = [metric for head in HEADS.values() for metric in head.metrics]
 
 
 def head_tables(results: Results) -> dict[str, Table]:
@@ -38,7 +28,11 @@ def head_errors_table(results: Results) -> Table:
     return Table.from_frame(
         "Outputs of further heads",
         score_heads(results),
-        (_METHOD, count_column("samples"), *_ERRORS),
+        (
+            _METHOD,
+            count_column("samples"),
+            *(number_column(metric.name, metric.title, metric.digits) for metric in _METRICS),
+        ),
         "AUROC: how well the probability of a door puts samples with a door above those without. Hinge: share "
         "correct; a flush closed leaf may show its side by nothing but the handle. Samples whose true value the "
         "manifest does not record are not counted.",
@@ -82,5 +76,5 @@ def parts_table(results: Results) -> Table:
     return Table.from_frame(
         "Parts of points: intersection over union",
         score_parts(results),
-        (_METHOD, *(number_column(name, digits=3) for name in (*PARTS, "mean"))),
+        (_METHOD, *(number_column(name, digits=3) for name in (*PART_NAMES, "mean"))),
     )

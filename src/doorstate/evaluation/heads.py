@@ -3,19 +3,16 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 
 import numpy as np
 import pandas as pd
-from sklearn.metrics import roc_auc_score
-
 from doorstate.evaluation.comparison import KEY_COLUMNS, RULE_COLUMNS, Results
 from doorstate.evaluation.manifest import number_column, text_column
-from doorstate.evaluation.metrics import ratio
-from doorstate.types import DECISION_THRESHOLD, NO_DOOR, STATES, Part
+from doorstate.networks.heads import HEADS, POINT_HEADS, head_metrics
+from doorstate.types import DECISION_THRESHOLD, NO_DOOR, PARTS, STATES
 
-PARTS = tuple(part.name.lower() for part in Part if part != Part.NONE)
+PART_NAMES = POINT_HEADS[PARTS].classes
 
 
 def head_rows(results: Results, method: str) -> pd.DataFrame | None:
@@ -36,47 +33,21 @@ def predicted(column: str) -> str:
 
 
 def head_errors(rows: pd.DataFrame) -> dict[str, float]:
-    """Return the errors of the heads of one network; NaN where nothing was predicted or the manifest does not know.
+    """Return the figures of merit of the heads of one network, by the names of `HeadSpec.metrics`.
+
+    A figure is NaN where the network has no such head or the manifest does not record the true values.
 
     Args:
         rows: of `head_rows`.
-
-    Returns:
-        door_auroc, angle_error_semi_open_deg, angle_error_open_deg (means), hinge_accuracy,
-        hinge_accuracy_not_closed, position_error_median_m, position_error_p90_m, yaw_error_median_deg,
-        opening_width_error_m and passable_width_error_m (means).
     """
-
-    def error(name: str) -> pd.Series[float]:
-        return (number_column(rows, predicted(name)) - number_column(rows, name)).abs()
-
-    def turn(name: str) -> pd.Series[float]:
-        difference = number_column(rows, predicted(name)) - number_column(rows, name)
-        return ((difference + 180) % 360 - 180).abs()
-
-    state = rows["state"]
-    angle = turn("opening_angle_deg")
-    hinge = hinge_is_correct(rows)
-    position = np.hypot(error("door_x_m"), error("door_y_m"))
-    return {
-        "door_auroc": _door_auroc(rows),
-        "angle_error_semi_open_deg": angle[state == "semi_open"].mean(),
-        "angle_error_open_deg": angle[state == "open"].mean(),
-        "hinge_accuracy": hinge.mean(),
-        "hinge_accuracy_not_closed": hinge[state.isin(["semi_open", "open"])].mean(),
-        "position_error_median_m": position.quantile(0.5),
-        "position_error_p90_m": position.quantile(0.9),
-        "yaw_error_median_deg": turn("door_yaw_deg").quantile(0.5),
-        "opening_width_error_m": error("opening_width_m").mean(),
-        "passable_width_error_m": error("passable_width_m").mean(),
-    }
-
-
-def hinge_is_correct(rows: pd.DataFrame) -> pd.Series[float]:
-    """Return 1 or 0 for each row, NaN where the hinge side is unknown or was not predicted."""
-    hinge, p_left = text_column(rows, "hinge"), number_column(rows, "p_hinge_left")
-    correct = (p_left >= DECISION_THRESHOLD) == (hinge == "left")
-    return correct.astype("float64").where((hinge != "") & p_left.notna())
+    outputs = {}
+    for name in (column for head in HEADS.values() for column in head.column_names):
+        own = name if name.startswith("p_") else predicted(name)
+        if own in rows and rows[own].notna().any():
+            outputs[name] = rows[own].to_numpy(dtype=np.float64)
+    names = {name for head in HEADS.values() for column in head.columns for name in (column.name, *column.manifest)}
+    truth = rows[[name for name in rows if name in names and not name.startswith("p_")]].astype("object")
+    return head_metrics(outputs, truth.where(truth.notna(), "").astype("str").to_dict("records"))
 
 
 def score_heads(results: Results) -> pd.DataFrame:
@@ -129,10 +100,9 @@ def score_parts(results: Results) -> pd.DataFrame:
         if not all(counts):
             continue
         joined = np.array(counts).sum(axis=0)  # (parts, parts)
-        hits = np.diagonal(joined)
-        shares = ratio(hits, joined.sum(axis=0) + joined.sum(axis=1) - hits)
+        shares = POINT_HEADS[PARTS].metric(joined)
         rows.append(
-            {"method": method, **dict(zip(PARTS, shares, strict=True)), "mean": float(np.nanmean(shares))}
+            {"method": method, **dict(zip(PART_NAMES, shares, strict=True)), "mean": float(np.nanmean(shares))}
         )
     return pd.DataFrame(rows)
 
@@ -148,10 +118,3 @@ def _with_presence(results: Results) -> Iterator[tuple[str, pd.DataFrame]]:
     for method, rows in _with_heads(results):
         if number_column(rows, "p_door").notna().any():
             yield method, rows
-
-
-def _door_auroc(rows: pd.DataFrame) -> float:
-    doors = rows["state"] != NO_DOOR
-    if number_column(rows, "p_door").isna().any() or doors.all() or not doors.any():
-        return math.nan
-    return float(roc_auc_score(doors, rows["p_door"]))
