@@ -24,7 +24,8 @@ from doorstate.cli.options import (
 from doorstate.errors import CloudReadError, ConfigError
 
 if TYPE_CHECKING:
-    from doorstate.evaluation.frames import Asked, Methods
+    from doorstate.evaluation.frame_scores import FrameScores
+    from doorstate.evaluation.frames import FrameResults, Predictors
     from doorstate.evaluation.table import Table
 
 _DOOR_COLUMN = "door"
@@ -94,7 +95,7 @@ def evaluate(
     from doorstate.cli.console import progress_bar, stderr
     from doorstate.dataset.labelled import check_column, labelled_frames
     from doorstate.evaluation.frame_tables import NO_GROUP, frame_notes, frame_tables
-    from doorstate.evaluation.frames import ask
+    from doorstate.evaluation.frames import evaluate_frames
 
     if everything and out is None:
         raise ConfigError("--all needs --out")
@@ -106,33 +107,35 @@ def evaluate(
         check_column(frames, column.partition(":")[0])
     if out is not None:
         check_writable(out / _PAGE)
-    methods = _methods(network, weights, rule, points)
+    predictors = _predictors(network, weights, rule, points)
     with progress_bar("Predicting") as progress:
-        asked = ask(methods, frames, progress)
-    for frame_row, reason in asked.unreadable:
+        results = evaluate_frames(predictors, frames, progress)
+    for frame_row, reason in results.unreadable:
         stderr.print(f"{frame_row.file}: {reason}", style="red", soft_wrap=True)
-    if not asked.frames:
+    if not results.frames:
         raise CloudReadError(f"none of {len(frames)} files could be read", path=folder)
-    metrics = asked.metrics(group, by or ())
-    tables, notes = frame_tables(metrics, group or NO_GROUP), frame_notes(metrics, group or NO_GROUP)
+    scores = results.score(group, by or ())
+    tables, notes = frame_tables(scores, group or NO_GROUP), frame_notes(scores, group or NO_GROUP)
     if as_json:
-        print(json.dumps(metrics))  # noqa: T201
+        print(json.dumps(scores.to_json()))  # noqa: T201
     else:
         _print(tables, notes)
     if out is not None:
-        page = _write(out, folder, methods, asked, metrics, tables, notes, everything)
+        page = _write(out, folder, predictors, results, scores, tables, notes, everything)
         stderr.print(f"page: {page}", soft_wrap=True)
-    if asked.unreadable:
-        stderr.print(f"{len(asked.unreadable)} of {len(frames)} files could not be read and are not counted")
+    if results.unreadable:
+        stderr.print(
+            f"{len(results.unreadable)} of {len(frames)} files could not be read and are not counted"
+        )
         raise typer.Exit(1)
 
 
-def _methods(
+def _predictors(
     networks: Sequence[str] | None,
     weights: Sequence[Path] | None,
     rules: Sequence[str] | None,
     points: int | None,
-) -> Methods:
+) -> Predictors:
     """Return the predictors by name; the default network if none is given."""
     from doorstate.cli.predictors import load_predictor
     from doorstate.inference.predictor import DEFAULT_NETWORK
@@ -166,31 +169,32 @@ def _print(tables: Mapping[str, Table], notes: Sequence[str]) -> None:
 def _write(
     out: Path,
     folder: Path,
-    methods: Methods,
-    asked: Asked,
-    metrics: Mapping[str, Any],
+    predictors: Predictors,
+    results: FrameResults,
+    scores: FrameScores,
     tables: Mapping[str, Table],
     notes: Sequence[str],
     everything: bool,
 ) -> Path:
     from doorstate import __version__
-    from doorstate._files import write_csv, write_text
+    from doorstate._files import write_text
     from doorstate.cli.console import progress_bar
     from doorstate.evaluation.tables import save_tables
     from doorstate.viewer.frame_page import choose_frames, frame_cards, render_frame_page
 
     name = folder.resolve().name
-    write_csv(out / "predictions.csv", asked.rows())
+    table = results.frame.drop(columns="correct").rename(columns={"sample_id": "file"})
+    write_text(out / "predictions.csv", table.to_csv(index=False, lineterminator="\n", float_format="%.5g"))
     header: dict[str, Any] = {
         "doorstate": __version__,
         "folder": name,
-        "not_read": {frame.file: reason for frame, reason in asked.unreadable},
+        "not_read": {frame.file: reason for frame, reason in results.unreadable},
     }
-    write_text(out / "metrics.json", json.dumps({**header, **metrics}, indent=2) + "\n")
+    write_text(out / "metrics.json", json.dumps({**header, **scores.to_json()}, indent=2) + "\n")
     save_tables(tables, out / "tables")
-    chosen = choose_frames(asked, everything)
+    chosen = choose_frames(results, everything)
     with progress_bar("Writing the page") as progress:
-        cards = frame_cards(asked, methods, chosen, progress)
+        cards = frame_cards(results, predictors, chosen, progress)
     page = out / _PAGE
-    write_text(page, render_frame_page(name, tables, asked, cards, notes))
+    write_text(page, render_frame_page(name, tables, results, cards, notes))
     return page

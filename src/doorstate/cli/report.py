@@ -35,14 +35,13 @@ def report(
     """
     from doorstate.cli.console import stderr, stdout
     from doorstate.dataset.store import is_prepared
-    from doorstate.evaluation.report import write_dataset_figures, write_report
+    from doorstate.evaluation.predictions import is_comparison
+    from doorstate.evaluation.report import write_dataset_report, write_report
 
-    is_dataset = len(folders) == 1 and not (folders[0] / "comparison.json").is_file()
+    is_dataset = len(folders) == 1 and not is_comparison(folders[0])
     if is_dataset and not is_prepared(folders[0]):
         raise DatasetError("neither a comparison nor a prepared data set", path=folders[0])
     target = out or folders[0] / "report"
     with stderr.status("Writing the report"):
-        page = (
-            write_dataset_figures(folders[0], target) if is_dataset else write_report(folders, target, data)
-        )
+        page = write_dataset_report(folders[0], target) if is_dataset else write_report(folders, target, data)
     stdout.print(f"report: {page}", soft_wrap=True)

@@ -34,12 +34,8 @@ def resolution(
     """
     from doorstate.cli.compare import compare_with_display
     from doorstate.cli.console import print_table
-    from doorstate.evaluation.resolution import (
-        LATENCY,
-        load_resolution,
-        resolution_table,
-        write_resolution,
-    )
+    from doorstate.evaluation.resolution import resolution_table, score_resolution, write_resolution
+    from doorstate.evaluation.study import LATENCY, load_study_results
     from doorstate.training.resolution import ResolutionStudy
     from doorstate.training.study import load_study
 
@@ -49,8 +45,9 @@ def resolution(
         compare_with_display(part.experiment, folder / part.folder, jobs)
     if not (folder / LATENCY).is_file():
         _measure_latency(settings, folder)
-    write_resolution(folder, folder / "report")
-    table = resolution_table(load_resolution(folder))
+    results = load_study_results(folder)
+    write_resolution(results, folder / "report")
+    table = resolution_table(score_resolution(results))
     print_table(table.title, table.columns, table.rows)
 
 
@@ -60,7 +57,7 @@ def _measure_latency(settings: ResolutionStudy, folder: Path) -> None:
     from doorstate._memory import keep_freed_memory
     from doorstate.cli.console import progress_bar
     from doorstate.dataset.store import open_dataset
-    from doorstate.evaluation.resolution import LATENCY
+    from doorstate.evaluation.study import LATENCY
     from doorstate.inference.budget import median_milliseconds
     from doorstate.inference.predictor import Predictor
     from doorstate.training.run_folder import AS_TRAINED, run_of

@@ -29,7 +29,8 @@ def transfer(
     """
     from doorstate.cli.compare import compare_with_display
     from doorstate.cli.console import print_table, stdout
-    from doorstate.evaluation.transfer import load_transfer_results, transfer_table, write_transfer
+    from doorstate.evaluation.study import load_study_results
+    from doorstate.evaluation.transfer import score_transfer, transfer_table, write_transfer
     from doorstate.training.study import load_study
     from doorstate.training.transfer import TransferStudy
 
@@ -39,7 +40,8 @@ def transfer(
     settings.prepare(folder)
     for part in parts:
         compare_with_display(part.experiment, folder / part.folder, jobs)
-    results = load_transfer_results(folder, tuple(settings.trained), tuple(settings.tested))
-    table = transfer_table(results)
+    results = load_study_results(folder)
+    scores = score_transfer(results, tuple(settings.trained), tuple(settings.tested))
+    table = transfer_table(scores)
     print_table(table.title, table.columns, table.rows)
-    stdout.print(f"tables and figure: {write_transfer(results, folder / 'report')}", soft_wrap=True)
+    stdout.print(f"tables and figure: {write_transfer(scores, folder / 'report')}", soft_wrap=True)

@@ -85,9 +85,7 @@ def calibrate(results: Results, method: str) -> Calibration | None:
         raw.append(probabilities)
         scaled.append(at_temperature(probabilities, temperature))
         temperatures.append(temperature)
-    return Calibration(
-        np.concatenate(true), np.concatenate(raw), np.concatenate(scaled), tuple(temperatures)
-    )
+    return Calibration(np.concatenate(true), np.concatenate(raw), np.concatenate(scaled), tuple(temperatures))
 
 
 def score_calibration(results: Results) -> pd.DataFrame:

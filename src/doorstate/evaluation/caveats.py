@@ -51,9 +51,7 @@ def caveats(results: Results) -> list[str]:
     if len(manifest) < PAPER_SAMPLES:
         notes.append(f"Reduced data: {len(manifest)} samples, the paper has {PAPER_SAMPLES}.")
     if config.num_points < NUM_POINTS:
-        notes.append(
-            f"Reduced resolution: {config.num_points} points a cloud, the paper has {NUM_POINTS}."
-        )
+        notes.append(f"Reduced resolution: {config.num_points} points a cloud, the paper has {NUM_POINTS}.")
     unused = [results.role_counts(fold)["unused"] for fold in range(config.folds)]
     if any(unused):
         notes.append(

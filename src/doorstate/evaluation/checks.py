@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -29,7 +30,9 @@ def check_predictions(results: Results, path_of: Callable[[str, int], Path]) -> 
             state differs from the manifest, or test samples are missing.
     """
     table = results.predictions
-    groups = {key: rows.index for key, rows in table.groupby(["method", "fold"], sort=False)}
+    groups: dict[tuple[str, int], Any] = {}
+    for (method, fold), rows in table.groupby(["method", "fold"], sort=False):
+        groups[str(method), int(str(fold))] = rows.index
     for record in results.runs:
         path = path_of(record.method, record.fold)
         run = table.loc[groups.pop((record.method, record.fold), [])]

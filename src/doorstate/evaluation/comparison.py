@@ -149,6 +149,7 @@ def join_manifest(predictions: pd.DataFrame, manifest: pd.DataFrame) -> pd.DataF
         if column not in TEXT_COLUMNS and column != "fold" and not column.startswith("p_")
     ]
     renamed = predictions.rename(columns={column: f"{column}_predicted" for column in measured})
-    known = manifest.drop(columns=["state", "sample_id"])
+    # Predictions win where a manifest has a column of the same name.
+    known = manifest.drop(columns=[name for name in manifest if name in renamed])
     joined = renamed.join(known, on="sample_id")
     return joined.assign(correct=joined["predicted"] == joined["state"])

@@ -73,7 +73,7 @@ def score_factors(results: Results) -> pd.DataFrame:
         tested = results.tested_by(method)
         correct = tested["correct"].to_numpy()
         for factor in FACTORS:
-            bins = _bins(factor.value(tested).to_numpy(dtype=np.float64), factor.edges)
+            bins = _bins(np.asarray(factor.value(tested), dtype=np.float64), factor.edges)
             if len(set(bins[bins >= 0])) < 2:
                 continue
             for index, (low, high) in enumerate(zip(factor.edges, factor.edges[1:], strict=False)):

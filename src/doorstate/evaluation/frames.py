@@ -1,94 +1,112 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Several methods asked about the same labelled frames."""
+"""Predictions of several methods for the same recorded, labelled frames."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
+
+import pandas as pd
 
 from doorstate._jobs import Progress, no_progress
 from doorstate.dataset.labelled import LabelledFrame, check_column
 from doorstate.errors import DoorstateError
-from doorstate.evaluation.frame_metrics import Said, is_wrong, measure
+from doorstate.evaluation.comparison import TEXT_COLUMNS, join_manifest
+from doorstate.evaluation.frame_scores import FrameScores, score_frames
+from doorstate.evaluation.manifest import text_column
 from doorstate.inference.abstention import Abstention
 from doorstate.inference.prediction import Prediction
 from doorstate.inference.predictor import Predictor
 from doorstate.types import ABSTAINED, STATES
 
-Methods = Mapping[str, Predictor]
+Predictors = Mapping[str, Predictor]
 
 
 @dataclass(frozen=True, eq=False)
-class Asked:
-    """Frames that could be read, what each method said of them, and the frames that could not be read."""
+class FrameResults:
+    """Frames that could be read, the predictions of each method for them, and frames that could not be read."""
 
     frames: tuple[LabelledFrame, ...]
-    predictions: Mapping[str, tuple[Prediction, ...]]  # by method, one a frame
+    outputs: Mapping[str, tuple[Prediction, ...]]  # by method, one a frame
     unreadable: tuple[tuple[LabelledFrame, str], ...]  # with the reason
 
-    def wrong(self, number: int) -> list[str]:
-        """Methods that were wrong about a frame, or gave a state where there is none to tell."""
-        label = self.frames[number].label
-        return [
-            name for name, said in self.predictions.items() if is_wrong(label, _said(said[number]).answer)
+    @cached_property
+    def predictions(self) -> pd.DataFrame:
+        """One row for each method and frame, with the columns of `Results.predictions`; `sample_id` is the file."""
+        rows = [
+            {
+                "method": method,
+                "sample_id": frame.file,
+                "state": frame.label,
+                "predicted": ABSTAINED if prediction.state is None else prediction.state.label,
+                **{f"p_{state}": prediction.probabilities[state] for state in STATES},
+                "p_door": _number(prediction.door_probability),
+                "opening_angle_deg": _number(prediction.opening_angle_deg),
+                "reason": prediction.reason,
+            }
+            for method, predictions in self.outputs.items()
+            for frame, prediction in zip(self.frames, predictions, strict=True)
         ]
+        table = pd.DataFrame(rows)
+        return table.astype({name: "str" for name in table if name in TEXT_COLUMNS})
 
-    def metrics(self, group: str | None, by: Sequence[str] = ()) -> dict[str, Any]:
-        """As of `frame_metrics.measure`.
+    @cached_property
+    def frame(self) -> pd.DataFrame:
+        """Predictions joined with the columns of the index, as `Results.frame` is with a manifest.
+
+        On a frame without a clear door an abstention is `correct`.
+        """
+        index = pd.DataFrame(
+            [{**frame.columns, "sample_id": frame.file, "state": ""} for frame in self.frames]
+        )
+        joined = join_manifest(self.predictions, index.astype("str").set_index("sample_id", drop=False))
+        is_door = joined["state"].isin(STATES)
+        return joined.assign(correct=joined["correct"].where(is_door, joined["predicted"] == ABSTAINED))
+
+    def misclassified_by(self, number: int) -> list[str]:
+        """Return the methods that misclassified a frame, or predicted a state where there is no clear door."""
+        rows = self.frame[self.frame["sample_id"] == self.frames[number].file]
+        return rows.loc[~rows["correct"], "method"].tolist()
+
+    def score(self, group: str | None = None, by: Sequence[str] = ()) -> FrameScores:
+        """Score every method.
 
         Args:
-            group: column whose values name what frames depend on, such as a door; None: on nothing.
-            by: columns to tell frames apart by; `column:word` tells those apart in which the column has that word.
+            group: column of the index by which frames depend on each other, such as a door; None: they do not.
+            by: columns to score separately by; `column:word` separates rows in which the column contains the word.
 
         Raises:
             ConfigError: no frame has such a column.
         """
-        return measure(
-            [frame.label for frame in self.frames],
-            self._groups(group),
-            {name: self._stratum(name) for name in by},
-            {name: [_said(each) for each in said] for name, said in self.predictions.items()},
-        )
+        for name in (*by, *([group] if group else ())):
+            check_column(self.frames, name.partition(":")[0])
+        file = self.frame["sample_id"]
+        groups = file if group is None else text_column(self.frame, group)
+        # A frame without a group is a group of its own; no value of a column starts as these do.
+        groups = groups.where(groups != "", "/" + file)
+        return score_frames(self.frame, groups, {name: self._stratum(name) for name in by})
 
-    def rows(self) -> list[dict[str, str]]:
-        """One line for each frame and method, with whatever else is known of the frame."""
-        return [
-            dict(frame.columns)
-            | {
-                "file": frame.file,
-                "state": frame.label,
-                "method": method,
-                "predicted": _said(said).answer,
-                **{f"p_{state}": f"{said.probabilities[state]:.5g}" for state in STATES},
-                "p_door": "" if said.door_probability is None else f"{said.door_probability:.5g}",
-                "found_angle_deg": "" if said.opening_angle_deg is None else f"{said.opening_angle_deg:.1f}",
-                "reason": said.reason,
-            }
-            for method, predictions in self.predictions.items()
-            for frame, said in zip(self.frames, predictions, strict=True)
-        ]
-
-    def _groups(self, column: str | None) -> list[str]:
-        if column is not None:
-            check_column(self.frames, column)
-        # A frame of which it is not known is like no other; a column's value is no file's name.
-        return [frame.columns.get(column or "") or f"/{frame.file}" for frame in self.frames]
-
-    def _stratum(self, name: str) -> list[str]:
+    def _stratum(self, name: str) -> pd.Series[str]:
         column, colon, word = name.partition(":")
-        check_column(self.frames, column)
-        values = [frame.columns.get(column, "") for frame in self.frames]
+        values = text_column(self.frame, column)
         if not colon:
-            return [value or "not said" for value in values]
-        return [word if word.lower() in value.lower() else f"not {word}" for value in values]
+            return values.where(values != "", "unknown")
+        contains = values.str.contains(word, case=False, regex=False)
+        return contains.map({True: word, False: f"not {word}"})
 
 
-def ask(methods: Methods, frames: Sequence[LabelledFrame], progress: Progress = no_progress) -> Asked:
-    """Read every frame once and ask every method; a frame that a method cannot use has no answer, with the reason."""
+def evaluate_frames(
+    predictors: Predictors, frames: Sequence[LabelledFrame], progress: Progress = no_progress
+) -> FrameResults:
+    """Read every frame once and predict its state with every method.
+
+    A method abstains from a frame that it cannot use, with the error as its reason.
+    """
     readable: list[LabelledFrame] = []
     unreadable: list[tuple[LabelledFrame, str]] = []
-    predictions: dict[str, list[Prediction]] = {name: [] for name in methods}
+    outputs: dict[str, list[Prediction]] = {name: [] for name in predictors}
     for number, frame in enumerate(frames):
         try:
             cloud = frame.read()
@@ -96,19 +114,19 @@ def ask(methods: Methods, frames: Sequence[LabelledFrame], progress: Progress = 
             unreadable.append((frame, error.describe(with_path=False)))
         else:
             readable.append(frame)
-            for name, method in methods.items():
+            for name, predictor in predictors.items():
                 try:
-                    said = method(cloud)
+                    prediction = predictor(cloud)
                 except DoorstateError as error:
-                    said = Prediction.abstain(Abstention.from_error(error))
-                predictions[name].append(said)
+                    prediction = Prediction.abstain(Abstention.from_error(error))
+                outputs[name].append(prediction)
         progress(number + 1, len(frames))
-    return Asked(
-        tuple(readable), {name: tuple(said) for name, said in predictions.items()}, tuple(unreadable)
+    return FrameResults(
+        tuple(readable),
+        {name: tuple(predictions) for name, predictions in outputs.items()},
+        tuple(unreadable),
     )
 
 
-def _said(prediction: Prediction) -> Said:
-    if prediction.state is None:
-        return Said(ABSTAINED, 0.0)
-    return Said(prediction.state.label, prediction.probabilities[prediction.state.label])
+def _number(value: float | None) -> float:
+    return math.nan if value is None else value

@@ -91,8 +91,10 @@ def build_gallery(results: Results, dataset: PreparedDataset) -> Gallery:
     chosen = errors.groupby("method", sort=False).head(CARDS_PER_METHOD)["sample_id"].unique()
     kept = errors[errors["sample_id"].isin(chosen)]
     # In the order of methods, as `Results.errors` is.
-    by_sample = dict(iter(kept.sort_index().groupby("sample_id", sort=True)))
-    order = sorted(by_sample, key=lambda name: (by_sample[name]["undecidable"].iloc[0], -len(by_sample[name])))
+    by_sample = {str(name): rows for name, rows in kept.sort_index().groupby("sample_id", sort=True)}
+    order = sorted(
+        by_sample, key=lambda name: (by_sample[name]["undecidable"].iloc[0], -len(by_sample[name]))
+    )
     left_out = errors["method"].value_counts().sub(kept["method"].value_counts(), fill_value=0)
     return Gallery(
         cards=tuple(_card(dataset, by_sample[name]) for name in order),

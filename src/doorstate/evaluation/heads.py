@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pandas as pd
+
 from doorstate.evaluation.comparison import KEY_COLUMNS, RULE_COLUMNS, Results
 from doorstate.evaluation.manifest import number_column, text_column
 from doorstate.networks.heads import HEADS, POINT_HEADS, head_metrics
@@ -20,7 +21,7 @@ def head_rows(results: Results, method: str) -> pd.DataFrame | None:
     if method not in results.networks:
         return None
     own = results.frame[(results.frame["method"] == method) & (results.frame["role"] == "test")]
-    names = [name for name in results.predictions if name not in KEY_COLUMNS and name not in RULE_COLUMNS]
+    names = [name for name in map(str, results.predictions) if name not in (*KEY_COLUMNS, *RULE_COLUMNS)]
     columns = [name if name in own else predicted(name) for name in names if name.startswith("p_")]
     columns += [predicted(name) for name in (*names, "opening_angle_deg") if not name.startswith("p_")]
     rows = own[own[columns].notna().any(axis=1)]
@@ -45,9 +46,14 @@ def head_errors(rows: pd.DataFrame) -> dict[str, float]:
         own = name if name.startswith("p_") else predicted(name)
         if own in rows and rows[own].notna().any():
             outputs[name] = rows[own].to_numpy(dtype=np.float64)
-    names = {name for head in HEADS.values() for column in head.columns for name in (column.name, *column.manifest)}
+    names = {
+        name for head in HEADS.values() for column in head.columns for name in (column.name, *column.manifest)
+    }
     truth = rows[[name for name in rows if name in names and not name.startswith("p_")]].astype("object")
-    return head_metrics(outputs, truth.where(truth.notna(), "").astype("str").to_dict("records"))
+    texts = truth.where(truth.notna(), "").astype("str")
+    return head_metrics(
+        outputs, [{str(key): value for key, value in row.items()} for row in texts.to_dict("records")]
+    )
 
 
 def score_heads(results: Results) -> pd.DataFrame:
@@ -102,7 +108,11 @@ def score_parts(results: Results) -> pd.DataFrame:
         joined = np.array(counts).sum(axis=0)  # (parts, parts)
         shares = POINT_HEADS[PARTS].metric(joined)
         rows.append(
-            {"method": method, **dict(zip(PART_NAMES, shares, strict=True)), "mean": float(np.nanmean(shares))}
+            {
+                "method": method,
+                **dict(zip(PART_NAMES, shares, strict=True)),
+                "mean": float(np.nanmean(shares)),
+            }
         )
     return pd.DataFrame(rows)
 

@@ -50,7 +50,11 @@ def score_resolution(study: Study) -> pd.DataFrame:
         raise RunError("holds no finished part of a resolution study", field="parts")
     all_points = sorted({points for _, points in scores})
     rows = [
-        {"method": method, "points": points, "milliseconds": study.latencies_ms.get((method, points), math.nan)}
+        {
+            "method": method,
+            "points": points,
+            "milliseconds": study.latencies_ms.get((method, points), math.nan),
+        }
         | scores.get((method, points), {})
         for method in methods
         for points in all_points

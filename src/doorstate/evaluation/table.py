@@ -74,7 +74,9 @@ class Table:
         """Format as a LaTeX longtable with its title; needs the packages booktabs and longtable."""
         align = "l" * self.text_columns + "r" * (len(self.columns) - self.text_columns)
         cells = pd.DataFrame(self.rows, columns=pd.Index(self.columns))
-        return cells.to_latex(index=False, escape=True, longtable=True, caption=self.title, column_format=align)
+        return cells.to_latex(
+            index=False, escape=True, longtable=True, caption=self.title, column_format=align
+        )
 
     def to_csv(self) -> str:
         """Write the numbers as CSV, 12 significant digits, an undefined one as an empty field; cells if there are none.

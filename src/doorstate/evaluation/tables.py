@@ -217,7 +217,11 @@ def runs_table(results: Results) -> Table:
     for method in results.config.methods:
         for fold in range(results.config.folds):
             run = records.get((method, fold))
-            row = {"method": method, "status": "missing" if run is None else "done", "fold": fold}
+            row: dict[str, object] = {
+                "method": method,
+                "status": "missing" if run is None else "done",
+                "fold": fold,
+            }
             if run is not None:
                 row |= {
                     "train_samples": run.metric("train_samples"),

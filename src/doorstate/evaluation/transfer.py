@@ -35,7 +35,9 @@ def score_transfer(study: Study, trained: Sequence[str], tested: Sequence[str]) 
     for row in trained:
         for column in tested:
             results = study.parts.get(f"{row}/{column}")
-            for method in results.methods if results is not None else ():
+            if results is None:
+                continue
+            for method in results.methods:
                 predictions = results.tested_by(method)
                 rows.append((method, row, column, len(predictions), macro_f1(predictions)))
     if not rows:

@@ -30,10 +30,16 @@ def decidable_ceiling(frame: pd.DataFrame) -> float:
     """
     undecidable = is_undecidable(frame)
     twins = frame[undecidable]
-    images = {
-        (pose, frozenset({state, *same.split()}))
-        for pose, state, same in zip(twins["pose_id"], twins["state"], twins["same_image_as"], strict=True)
-    } if len(twins) else set()
+    images = (
+        {
+            (pose, frozenset({state, *same.split()}))
+            for pose, state, same in zip(
+                twins["pose_id"], twins["state"], twins["same_image_as"], strict=True
+            )
+        }
+        if len(twins)
+        else set()
+    )
     return float(ratio(int((~undecidable).sum()) + len(images), len(frame)))
 
 

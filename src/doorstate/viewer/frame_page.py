@@ -16,7 +16,7 @@ from PIL import Image
 from doorstate import __version__
 from doorstate._jobs import Progress, no_progress
 from doorstate.dataset.labelled import LabelledFrame
-from doorstate.evaluation.frames import Asked, Methods
+from doorstate.evaluation.frames import FrameResults, Predictors
 from doorstate.evaluation.gallery import missed_by, picture_uri
 from doorstate.evaluation.pages import render_page
 from doorstate.evaluation.table import Table
@@ -56,15 +56,15 @@ class FrameCard:
     wrong: tuple[str, ...]
 
 
-def choose_frames(asked: Asked, everything: bool, most: int = MOST_CARDS) -> list[int]:
+def choose_frames(results: FrameResults, everything: bool, most: int = MOST_CARDS) -> list[int]:
     """Numbers of the frames to show: those that most methods missed first, then in their order.
 
     Args:
-        asked: what was said.
+        results: predictions for the frames.
         everything: also those about which all were right.
         most: no more than these.
     """
-    missed = {number: len(asked.wrong(number)) for number in range(len(asked.frames))}
+    missed = {number: len(results.misclassified_by(number)) for number in range(len(results.frames))}
     chosen = sorted(
         (number for number in missed if everything or missed[number]), key=lambda each: -missed[each]
     )
@@ -72,19 +72,19 @@ def choose_frames(asked: Asked, everything: bool, most: int = MOST_CARDS) -> lis
 
 
 def frame_cards(
-    asked: Asked, methods: Methods, chosen: Sequence[int], progress: Progress = no_progress
+    results: FrameResults, predictors: Predictors, chosen: Sequence[int], progress: Progress = no_progress
 ) -> list[FrameCard]:
     """Read the chosen frames again, and look at what every method looked at.
 
     Args:
-        asked: what was said.
-        methods: who said it.
+        results: predictions for the frames.
+        predictors: by name.
         chosen: numbers of frames.
         progress: told after each.
     """
     cards = []
     for done, number in enumerate(chosen, 1):
-        frame = asked.frames[number]
+        frame = results.frames[number]
         cloud = frame.read()
         named = NamedCloud(frame.file, cloud, truth=frame.label if frame.label in STATES else "")
         cards.append(
@@ -93,8 +93,8 @@ def frame_cards(
                 frame.label,
                 tuple(f"{name.replace('_', ' ')}: {value}" for name, value in _told(frame).items()),
                 _pictures(frame, cloud),
-                {name: make_entry(method, named) for name, method in methods.items()},
-                tuple(asked.wrong(number)),
+                {name: make_entry(method, named) for name, method in predictors.items()},
+                tuple(results.misclassified_by(number)),
             )
         )
         progress(done, len(chosen))
@@ -104,7 +104,7 @@ def frame_cards(
 def render_frame_page(
     title: str,
     tables: Mapping[str, Table],
-    asked: Asked,
+    results: FrameResults,
     cards: Sequence[FrameCard],
     notes: Sequence[str] = (),
 ) -> str:
@@ -113,7 +113,7 @@ def render_frame_page(
     Args:
         title: name of the folder.
         tables: of `frame_tables`.
-        asked: what was said.
+        results: predictions for the frames.
         cards: of `frame_cards`.
         notes: to be read before the numbers.
     """
@@ -124,13 +124,13 @@ def render_frame_page(
         version=__version__,
         tables=tables,
         notes=notes,
-        groups=_groups(cards, len(asked.predictions)),
+        groups=_groups(cards, len(results.outputs)),
         shown=len(cards),
-        left_out=sum(bool(asked.wrong(number)) for number in range(len(asked.frames)))
+        left_out=sum(bool(results.misclassified_by(number)) for number in range(len(results.frames)))
         - sum(bool(card.wrong) for card in cards),
-        total=len(asked.frames),
-        methods=list(asked.predictions),
-        unreadable=asked.unreadable,
+        total=len(results.frames),
+        methods=list(results.outputs),
+        unreadable=results.unreadable,
         states=STATES,
         state_colors=STATE_COLORS,
         shapes=_shapes(cards),

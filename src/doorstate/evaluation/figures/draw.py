@@ -40,7 +40,10 @@ def draw_figures(
         "errors_in_plan": errors_figure(results),
         "factors": factors_figure(results),
     }
-    return {**(draw_dataset_figures(dataset) if of_dataset is None else of_dataset), **encode_figures(figures)}
+    return {
+        **(draw_dataset_figures(dataset) if of_dataset is None else of_dataset),
+        **encode_figures(figures),
+    }
 
 
 def draw_dataset_figures(dataset: PreparedDataset) -> dict[str, bytes]:

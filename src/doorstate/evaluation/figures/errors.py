@@ -30,10 +30,11 @@ def surest_errors_figure(results: Results, dataset: PreparedDataset) -> Figure |
     figure, axes = _grid(len(lines))
     for line, (method, of_method) in enumerate(lines):
         axes[2 * line][0].set_ylabel(f"{method}\n{len(of_method)} errors", fontsize=10)
-        for column, error in enumerate(of_method.head(_COLUMNS).itertuples()):
-            title = f"{STATE_WORDS[error.state]} as {STATE_WORDS[error.predicted]}, {error.confidence:.2f}"
-            _draw(axes[2 * line][column], axes[2 * line + 1][column], dataset, error.sample_id, title)
-            shapes = results.detections.get(method, {}).get(error.sample_id, ())
+        for column, (_, error) in enumerate(of_method.head(_COLUMNS).iterrows()):
+            words = STATE_WORDS[error["state"]], STATE_WORDS[error["predicted"]]
+            title = f"{words[0]} as {words[1]}, {error['confidence']:.2f}"
+            _draw(axes[2 * line][column], axes[2 * line + 1][column], dataset, error["sample_id"], title)
+            shapes = results.detections.get(method, {}).get(error["sample_id"], ())
             draw_detections(axes[2 * line + 1][column], shapes)
     drawn = [sample for _, of_method in lines for sample in of_method["sample_id"].head(_COLUMNS)]
     part_legend(figure, dataset, map(dataset.index_of, drawn))

@@ -15,8 +15,8 @@ from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
 from doorstate.dataset.strata import REGIONS
-from doorstate.evaluation.metrics import Floats
 from doorstate.evaluation.comparison import Results
+from doorstate.evaluation.metrics import Floats
 from doorstate.evaluation.undecidable import is_undecidable
 from doorstate.evaluation.views import REGION_COLORS, STATE_COLORS, STATE_WORDS, outside_legend
 from doorstate.simulation.manifest import unflatten
@@ -81,7 +81,9 @@ def errors_figure(results: Results) -> Figure | None:
         of_method = errors["method"] == method
         for state in STATES:
             for hollow in (False, True):
-                chosen = of_method & (errors["state"] == state) & (undecidable == hollow) & errors["x_m"].notna()
+                chosen = (
+                    of_method & (errors["state"] == state) & (undecidable == hollow) & errors["x_m"].notna()
+                )
                 axis.scatter(
                     *_positions(errors[chosen]).T,
                     s=26,
@@ -107,10 +109,9 @@ def errors_figure(results: Results) -> Figure | None:
 
 def _door_of(manifest: pd.DataFrame) -> Door:
     """Return the door that all samples of a simulated data set show; for other data sets, the default door."""
-    if "scene" not in manifest or "scene_id" in manifest:
-        return Door()
     first = {str(name): "" if value != value else str(value) for name, value in manifest.iloc[0].items()}
-    return (unflatten(first).scene.door if first["scene"] else None) or Door()
+    shows_one_scene = first.get("scene") and not first.get("scene_id")
+    return (unflatten(first).scene.door if shows_one_scene else None) or Door()
 
 
 def _posed(manifest: pd.DataFrame) -> pd.DataFrame:

@@ -87,13 +87,14 @@ def _typical_sample(manifest: pd.DataFrame, state: str, region: str) -> int | No
     chosen = manifest[of_state & (manifest["region"] == region)] if region else manifest[of_state]
     if chosen.empty:
         return None
+    places = pd.Series(range(len(manifest)), index=manifest.index)
     if not region:
-        return int(manifest.index.get_loc(chosen.index[0]))
+        return int(places[chosen.index[0]])
     low, high = REGIONS[region]
     off_angle = (chosen["robot_angle_deg"] - (low + high) / 2).abs() / (high - low)
     distance = off_angle + (chosen["distance_m"] - _MIDDLE_M).abs()
     order = pd.DataFrame({"undecidable": is_undecidable(chosen), "distance": distance})
-    return int(manifest.index.get_loc(order.sort_values(["undecidable", "distance"], kind="stable").index[0]))
+    return int(places[order.sort_values(["undecidable", "distance"], kind="stable").index[0]])
 
 
 def _drawn_parts(dataset: PreparedDataset, index: int) -> NDArray[np.uint8]:
