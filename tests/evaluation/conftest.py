@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Small prepared data sets, and comparison folders whose errors are chosen by the test."""
+"""Small prepared data sets, and comparison folders with errors chosen by the test."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def simulated(tmp_path_factory: pytest.TempPathFactory) -> PreparedDataset:
 
 @pytest.fixture(scope="session")
 def imported(tmp_path_factory: pytest.TempPathFactory) -> PreparedDataset:
-    """Sixty clouds of somebody who knows nothing but their states."""
+    """Sixty clouds of which only the states are known."""
     rows = [{"sample_id": f"{state}/{n}", "state": state} for n in range(20) for state in STATES]
     return _write_dataset(tmp_path_factory.mktemp("imported") / "data", rows, "imported")
 
@@ -72,7 +72,7 @@ def with_empty_scenes(tmp_path_factory: pytest.TempPathFactory) -> PreparedDatas
 
 @pytest.fixture
 def make_comparison(tmp_path: Path) -> MakeComparison:
-    """Write a comparison folder: every answer right, but for those in `wrong[network][sample_id]`."""
+    """Write a comparison folder: all predictions correct, but for those in `wrong[network][sample_id]`."""
 
     def make(
         dataset: PreparedDataset,
@@ -101,32 +101,32 @@ def make_comparison(tmp_path: Path) -> MakeComparison:
             tested = [name for name, role in roles.items() if role == "test" and states[name] != NO_DOOR]
             for network in networks:
                 if (network, fold) not in missing:
-                    answers = {sample_id: states[sample_id] for sample_id in tested}
-                    answers |= {k: v for k, v in (wrong or {}).get(network, {}).items() if k in answers}
-                    _write_run(folder / "runs" / network / f"fold{fold}", states, answers)
+                    predicted = {sample_id: states[sample_id] for sample_id in tested}
+                    predicted |= {k: v for k, v in (wrong or {}).get(network, {}).items() if k in predicted}
+                    _write_run(folder / "runs" / network / f"fold{fold}", states, predicted)
         return folder
 
     return make
 
 
 @pytest.fixture
-def add_found() -> Callable[..., None]:
-    """Say what a method found in a sample, in the run that tested it."""
+def add_detections() -> Callable[..., None]:
+    """Record detections of a method in a sample, in the run that tested it."""
 
-    def add(folder: Path, method: str, sample_id: str, found: list[list[Any]]) -> None:
+    def add(folder: Path, method: str, sample_id: str, detections: list[list[Any]]) -> None:
         for path in (folder / "runs" / method).rglob("predictions.csv"):
             if f"\n{sample_id}," in path.read_text():
-                record = {"sample_id": sample_id, "detections": found}
+                record = {"sample_id": sample_id, "detections": detections}
                 path.with_name("detections.jsonl").write_text(json.dumps(record) + "\n")
 
     return add
 
 
-def _write_run(folder: Path, states: Mapping[str, str], answers: Mapping[str, str]) -> None:
+def _write_run(folder: Path, states: Mapping[str, str], predictions: Mapping[str, str]) -> None:
     rows = [
-        {"sample_id": sample_id, "state": states[sample_id], "predicted": answer}
-        | {f"p_{state}": "0.7" if state == answer else "0.15" for state in STATES}
-        for sample_id, answer in answers.items()
+        {"sample_id": sample_id, "state": states[sample_id], "predicted": predicted}
+        | {f"p_{state}": "0.7" if state == predicted else "0.15" for state in STATES}
+        for sample_id, predicted in predictions.items()
     ]
     write_csv(folder / "predictions.csv", rows)
     log = [

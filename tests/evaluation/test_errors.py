@@ -1,63 +1,53 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which errors are shown, and what they are said to have in common."""
+"""Lists and summaries of errors."""
 
 from __future__ import annotations
 
-import csv
-from collections.abc import Callable
-from pathlib import Path
-
-from doorstate.dataset.store import PreparedDataset, open_dataset
-from doorstate.evaluation.error_kinds import error_kinds_table
-from doorstate.evaluation.errors_figure import common_errors_figure, surest_errors_figure
-from doorstate.evaluation.results import load_results
+from doorstate.dataset.store import PreparedDataset
+from doorstate.evaluation.errors import list_errors, order_errors, summarize_errors
+from doorstate.evaluation.predictions import load_results
+from tests.evaluation.conftest import MakeComparison
 
 
 def test_errors_are_counted_by_kind_with_their_ranges(
-    simulated: PreparedDataset, make_comparison: Callable[..., Path]
+    simulated: PreparedDataset, make_comparison: MakeComparison
 ) -> None:
     poses = [row["pose_id"] for row in simulated.rows[::3]]
     wrong = {f"{pose}-open": "semi_open" for pose in poses[3:6]} | {f"{poses[1]}-closed": "open"}
     results = load_results(make_comparison(simulated, {"dgcnn": wrong}))
-    first, second = csv.DictReader(error_kinds_table(results, simulated).to_csv().splitlines())
-    assert (first["network"], first["true state"], first["taken for"], first["errors"]) == (
-        "dgcnn",
-        "closed",
-        "open",
-        "1",
-    )
-    assert second["errors"] == "3"
+    first, second = summarize_errors(results).to_dict("records")
+    assert (first["method"], first["state"], first["predicted"]) == ("dgcnn", "closed", "open")
+    assert (first["errors"], second["errors"]) == (1, 3)
     missed = [simulated.rows[simulated.index_of(name)] for name in list(wrong)[:3]]
     angles = sorted(float(row["opening_angle_deg"]) for row in missed)
-    assert second["opening angle, °"] == " / ".join(f"{angle:.0f}" for angle in angles)
+    assert [second[f"opening_angle_deg_{end}"] for end in ("min", "median", "max")] == angles
     assert sum(int(part.split()[0]) for part in second["regions"].split(", ")) == 3
 
 
-def test_figures_show_errors_of_each_network_and_shared_ones(
-    simulated: PreparedDataset, make_comparison: Callable[..., Path]
+def test_listed_errors_carry_the_manifest(
+    simulated: PreparedDataset, imported: PreparedDataset, make_comparison: MakeComparison
 ) -> None:
-    poses = [row["pose_id"] for row in simulated.rows[::3]]
-    wrong = {
-        "dgcnn": {f"{pose}-open": "closed" for pose in poses[3:10]},
-        "pointnet": {f"{poses[3]}-open": "semi_open"},
-    }
-    results = load_results(make_comparison(simulated, wrong))
-    surest = surest_errors_figure(results, simulated)
-    assert surest is not None
-    labels = [axis.get_ylabel() for axis in surest.axes if axis.get_ylabel()]
-    assert labels == ["pointnet\n1 errors", "dgcnn\n7 errors"]
-    assert sum(bool(axis.get_title()) for axis in surest.axes) == 6, "five of a network at most"
-    common = common_errors_figure(results, simulated)
-    assert common is not None
-    (title,) = [axis.get_title() for axis in common.axes if axis.get_title()]
-    assert title == "open as closed or semi-open\nby pointnet, dgcnn"
+    row = simulated.rows[2]
+    wrong = {"dgcnn": {row["sample_id"]: "semi_open"}}
+    (error,) = list_errors(load_results(make_comparison(simulated, wrong))).to_dict("records")
+    assert (error["method"], error["state"], error["predicted"]) == ("dgcnn", "open", "semi_open")
+    assert (error["p_closed"], error["p_semi_open"]) == (0.15, 0.7)
+    assert (error["region"], error["same_image_as"]) == (row["region"], "semi_open")
+    assert error["opening_angle_deg"] == float(row["opening_angle_deg"])
+    errors = list_errors(load_results(make_comparison(imported, {"dgcnn": {"open/3": "closed"}})))
+    assert errors["sample_id"].tolist() == ["open/3"]
+    assert errors[["region", "distance_m"]].isna().all(axis=None)
 
 
-def test_without_errors_there_is_nothing_to_show(
-    simulated: PreparedDataset, make_comparison: Callable[..., Path]
+def test_decidable_errors_come_first_then_by_confidence(
+    simulated: PreparedDataset, make_comparison: MakeComparison
 ) -> None:
-    folder = make_comparison(simulated)
-    results, dataset = load_results(folder), open_dataset(simulated.folder)
-    assert surest_errors_figure(results, dataset) is None
-    assert common_errors_figure(results, dataset) is None
-    assert error_kinds_table(results, dataset).rows == ()
+    twin, first, second = (simulated.rows[k]["sample_id"] for k in (2, 6, 9))
+    folder = make_comparison(simulated, {"dgcnn": {twin: "semi_open", first: "open", second: "open"}})
+    for path in (folder / "runs" / "dgcnn").rglob("predictions.csv"):
+        path.write_text(
+            path.read_text().replace(
+                f"{second},closed,open,0.15,0.15,0.7", f"{second},closed,open,0.05,0.05,0.9"
+            )
+        )
+    assert order_errors(load_results(folder).errors)["sample_id"].tolist() == [second, first, twin]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Several methods asked about the same frames: one reading, one answer each, and what nobody could read."""
+"""Predictions of several methods for the same frames: one reading, one prediction each, and unreadable files."""
 
 from __future__ import annotations
 
@@ -12,21 +12,20 @@ import pytest
 
 from doorstate.dataset.labelled import LabelledFrame
 from doorstate.errors import CloudReadError, ConfigError
-from doorstate.evaluation.frames import Asked, Methods, ask
+from doorstate.evaluation.frames import FrameResults, Predictors, evaluate_frames
 from doorstate.inference.predictor import Predictor
-from doorstate.inference.rule_predictor import RulePredictor
 from doorstate.simulation.frames import Frame
 from doorstate.types import ABSTAINED, STATES, Points
 from doorstate.viewer.frame_page import choose_frames
 
 
 @pytest.fixture(scope="module")
-def methods(viewer: Predictor) -> Methods:
-    return {"net": viewer, "plane_state": RulePredictor.from_name("plane_state")}
+def predictors(viewer: Predictor) -> Predictors:
+    return {"net": viewer, "plane_state": Predictor.load(rule="plane_state")}
 
 
 def broken() -> Points:
-    raise CloudReadError("d.pcd: is no PCD file")
+    raise CloudReadError("is no PCD file", path="d.pcd")
 
 
 @pytest.fixture(scope="module")
@@ -38,12 +37,12 @@ def labelled(frames: list[Frame]) -> list[LabelledFrame]:
     def frame(name: str, label: str, read: object, **columns: str) -> LabelledFrame:
         return LabelledFrame(name, label, columns, Path(), read)  # type: ignore[arg-type]
 
-    known = [
+    doors = [
         frame(f"{state}.pcd", state, partial(np.copy, cloud), door="wood", light="dim")
         for state, cloud in zip(STATES, clouds, strict=True)
     ]
     return [
-        *known,
+        *doors,
         frame("wall.pcd", "no_door", partial(np.copy, clouds[0])),
         frame("tiny.pcd", "open", partial(np.copy, tiny), door="wood and GLASS"),
         frame("broken.pcd", "open", broken),
@@ -51,81 +50,81 @@ def labelled(frames: list[Frame]) -> list[LabelledFrame]:
 
 
 @pytest.fixture(scope="module")
-def asked(methods: Methods, labelled: list[LabelledFrame]) -> Asked:
-    return ask(methods, labelled)
+def results(predictors: Predictors, labelled: list[LabelledFrame]) -> FrameResults:
+    return evaluate_frames(predictors, labelled)
 
 
-def test_every_method_is_asked_about_every_frame_that_can_be_read(
-    asked: Asked, methods: Methods, frames: list[Frame]
+def test_every_method_predicts_every_readable_frame(
+    results: FrameResults, predictors: Predictors, frames: list[Frame]
 ) -> None:
-    assert [frame.file for frame in asked.frames] == [
-        "closed.pcd",
-        "semi_open.pcd",
-        "open.pcd",
-        "wall.pcd",
-        "tiny.pcd",
-    ]
-    assert [(frame.file, why) for frame, why in asked.unreadable] == [("broken.pcd", "d.pcd: is no PCD file")]
-    for name, method in methods.items():
-        assert asked.predictions[name][0].state == method(frames[0].points).state
-        assert len(asked.predictions[name]) == 5
+    files = ["closed.pcd", "semi_open.pcd", "open.pcd", "wall.pcd", "tiny.pcd"]
+    assert [frame.file for frame in results.frames] == files
+    assert [frame.file for frame, _ in results.unreadable] == ["broken.pcd"]
+    for name, predictor in predictors.items():
+        assert results.outputs[name][0].state == predictor(frames[0].points).state
+        assert len(results.outputs[name]) == 5
 
 
-def test_a_cloud_that_a_method_cannot_use_has_no_answer_and_a_reason(asked: Asked) -> None:
-    for said in asked.predictions.values():
-        assert said[4].state is None
-        assert said[4].reason
-    assert set(asked.wrong(4)) == {"net", "plane_state"}
+def test_a_method_abstains_from_a_cloud_it_cannot_use(results: FrameResults) -> None:
+    for predictions in results.outputs.values():
+        assert predictions[4].state is None
+        assert predictions[4].reason
+    assert set(results.misclassified_by(4)) == {"net", "plane_state"}
 
 
-def test_progress_counts_files(methods: Methods, labelled: list[LabelledFrame]) -> None:
-    seen: list[tuple[int, int]] = []
-    ask({"plane_state": methods["plane_state"]}, labelled[:2], lambda done, total: seen.append((done, total)))
-    assert seen == [(1, 2), (2, 2)]
+def test_progress_counts_files(predictors: Predictors, labelled: list[LabelledFrame]) -> None:
+    calls: list[tuple[int, int]] = []
+    rule = {"plane_state": predictors["plane_state"]}
+    evaluate_frames(rule, labelled[:2], lambda done, total: calls.append((done, total)))
+    assert calls == [(1, 2), (2, 2)]
 
 
-def test_metrics_are_of_the_answers(asked: Asked) -> None:
-    metrics = asked.metrics("door", ["light", "door:glass"])
-    right = sum(
-        asked.predictions["plane_state"][number].state is not None
-        and asked.predictions["plane_state"][number].state.label == frame.label
-        for number, frame in enumerate(asked.frames)
+def test_scores_count_the_predictions(results: FrameResults) -> None:
+    scores = results.score("door", ["light", "door:glass"])
+    correct = sum(
+        prediction.state is not None and prediction.state.label == frame.label
+        for frame, prediction in zip(results.frames, results.outputs["plane_state"], strict=True)
     )
-    found = metrics["methods"]["plane_state"]
-    assert found["all"]["right"] == right
-    assert (metrics["frames"], metrics["groups"]) == (4, 2)
-    assert {name: part["frames"] for name, part in found["by"]["light"].items()} == {"dim": 3, "not said": 1}
-    assert {name: part["frames"] for name, part in found["by"]["door:glass"].items()} == {
-        "not glass": 3,
-        "glass": 1,
-    }
-    assert found["without_a_door"]["no_door"]["frames"] == 1
-    assert asked.metrics(None)["groups"] == 4
-    with pytest.raises(ConfigError, match="no column 'colour'; there are: door, light"):
-        asked.metrics("colour")
+    by_method = scores.scores.set_index("method")
+    assert by_method.loc["plane_state", "correct"] == correct
+    assert (scores.frames, scores.groups) == (4, 2)
+    for name, expected in (
+        ("light", {"dim": 3, "unknown": 1}),
+        ("door:glass", {"not glass": 3, "glass": 1}),
+    ):
+        parts = scores.strata[name]
+        parts = parts[parts["method"] == "net"]
+        assert dict(zip(parts["value"], parts["frames"], strict=True)) == expected
+    assert scores.without_door["label"].tolist() == ["no_door"] * 2
+    assert results.score().groups == 4
+    with pytest.raises(ConfigError):
+        results.score("colour")
 
 
-def test_rows_hold_answers_and_what_is_known(asked: Asked) -> None:
-    rows = asked.rows()
-    assert len(rows) == 10
-    assert (rows[0]["file"], rows[0]["method"], rows[0]["door"]) == ("closed.pcd", "net", "wood")
-    assert sum(float(rows[0][f"p_{state}"]) for state in STATES) == pytest.approx(1, abs=1e-4)
-    assert rows[4]["predicted"] == ABSTAINED
+def test_the_frame_joins_predictions_with_the_index(results: FrameResults) -> None:
+    frame = results.frame
+    assert len(frame) == 10
+    first = frame.iloc[0]
+    assert (first["sample_id"], first["method"], first["door"]) == ("closed.pcd", "net", "wood")
+    assert first[[f"p_{state}" for state in STATES]].sum() == pytest.approx(1)
+    assert frame["predicted"].iloc[4] == ABSTAINED
+    on_wall = frame[frame["state"] == "no_door"]
+    assert on_wall["correct"].tolist() == (on_wall["predicted"] == ABSTAINED).tolist()
 
 
-def test_no_column_of_the_index_takes_the_place_of_an_answer(
-    methods: Methods, labelled: list[LabelledFrame]
+def test_a_column_of_the_index_does_not_replace_a_prediction(
+    predictors: Predictors, labelled: list[LabelledFrame]
 ) -> None:
-    told = replace(labelled[0], columns={"predicted": "open", "p_open": "1", "note": "kept"})
-    (row,) = ask({"plane_state": methods["plane_state"]}, [told]).rows()
-    assert (row["predicted"], row["p_closed"], row["note"]) == ("closed", "1", "kept")
+    frame = replace(labelled[0], columns={"predicted": "open", "p_open": "1", "note": "kept"})
+    (row,) = evaluate_frames({"plane_state": predictors["plane_state"]}, [frame]).frame.to_dict("records")
+    assert (row["predicted"], row["p_closed"], row["note"]) == ("closed", 1, "kept")
 
 
-def test_frames_that_most_methods_missed_come_first(asked: Asked) -> None:
-    chosen = choose_frames(asked, everything=True)
-    misses = [len(asked.wrong(number)) for number in chosen]
+def test_frames_that_most_methods_missed_come_first(results: FrameResults) -> None:
+    chosen = choose_frames(results, everything=True)
+    misses = [len(results.misclassified_by(number)) for number in chosen]
     assert sorted(chosen) == [0, 1, 2, 3, 4]
     assert misses == sorted(misses, reverse=True)
-    wrong_only = choose_frames(asked, everything=False)
-    assert wrong_only == [number for number in chosen if asked.wrong(number)]
-    assert choose_frames(asked, everything=True, most=2) == chosen[:2]
+    wrong_only = choose_frames(results, everything=False)
+    assert wrong_only == [number for number in chosen if results.misclassified_by(number)]
+    assert choose_frames(results, everything=True, most=2) == chosen[:2]

@@ -63,9 +63,9 @@ def test_every_state_region_and_part_has_its_own_colour() -> None:
 @pytest.mark.parametrize(
     "labels",
     [
-        ["training", "validation", "the epoch that was kept"],
+        ["training", "validation", "selected epoch"],
         ["closed door", "semi-open door", "open door", "hollow: undecidable"],
-        ["as trained", "temperature scaled", "fewer than 10 answers"],
+        ["as trained", "temperature scaled", "fewer than 10 predictions"],
     ],
 )
 def test_a_legend_is_no_wider_than_its_figure(width_in: float, labels: list[str]) -> None:

@@ -59,7 +59,7 @@ class Calibration(NamedTuple):
 
 def labels_and_probabilities(predictions: pd.DataFrame) -> tuple[Indices, Floats]:
     """Return (N,) true labels and (N, 3) probabilities of rows with a door."""
-    labels = pd.Categorical(predictions["state"], STATES).codes.astype(np.int64)
+    labels = pd.Index(STATES).get_indexer(predictions["state"]).astype(np.int64)
     return labels, predictions[list(PROBABILITY_COLUMNS)].to_numpy(dtype=np.float64)
 
 

@@ -27,7 +27,8 @@ def wilson_interval(successes: float, trials: float) -> Interval:
     if trials == 0:
         return _UNDEFINED
     low, high = proportion_confint(successes, trials, alpha=1 - CONFIDENCE, method="wilson")
-    return max(0.0, float(low)), min(1.0, float(high))
+    # The ends are exact where rounding is not.
+    return float(low) if successes else 0.0, float(high) if successes < trials else 1.0
 
 
 def grouped_interval(correct: NDArray[np.bool_], groups: Sequence[str] | pd.Series[str]) -> Interval:

@@ -35,8 +35,8 @@ def confusion(predictions: pd.DataFrame) -> Indices:
 
 def confusion_cells(predictions: pd.DataFrame) -> Indices:
     """Return for each row its cell of a flattened (3, 4) confusion matrix, -1 for a sample without a door."""
-    state = pd.Categorical(predictions["state"], STATES).codes.astype(np.int64)
-    predicted = pd.Categorical(predictions["predicted"], PREDICTED_LABELS).codes.astype(np.int64)
+    state = pd.Index(STATES).get_indexer(predictions["state"]).astype(np.int64)
+    predicted = pd.Index(PREDICTED_LABELS).get_indexer(predictions["predicted"]).astype(np.int64)
     return np.where((state >= 0) & (predicted >= 0), state * len(PREDICTED_LABELS) + predicted, -1)
 
 

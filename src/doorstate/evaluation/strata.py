@@ -30,7 +30,7 @@ def count_samples(manifest: pd.DataFrame) -> pd.DataFrame:
         Columns state, region, one a band, all.
     """
     states = [*STATES, *([NO_DOOR] if (manifest["state"] == NO_DOOR).any() else [])]
-    codes = pd.Categorical(manifest["state"], states).codes
+    codes = pd.Index(states).get_indexer(manifest["state"])
     grid = _with_sums(_count(manifest, codes, len(states)))
     grid = np.concatenate([grid, grid.sum(axis=-1, keepdims=True)], axis=-1)  # (6, 5, states + 1)
     rows = [
@@ -83,8 +83,8 @@ def _count(frame: pd.DataFrame, codes: ArrayLike, num_codes: int) -> Indices:
     """Count N rows by region, band and code (an integer each); rows outside the strata are left out."""
     inside = _in_strata(frame).to_numpy()
     counts = np.zeros((len(REGIONS), len(BANDS), num_codes), dtype=np.int64)
-    region = pd.Categorical(frame["region"][inside], list(REGIONS)).codes
-    band = pd.Categorical(frame["distance_band"][inside], list(BANDS)).codes
+    region = pd.Index(list(REGIONS)).get_indexer(frame["region"][inside])
+    band = pd.Index(BANDS).get_indexer(frame["distance_band"][inside])
     np.add.at(counts, (region, band, np.asarray(codes)[inside]), 1)
     return counts
 

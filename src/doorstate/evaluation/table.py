@@ -47,17 +47,15 @@ class Table:
             columns: those to show, labels first.
             note: to be read below the table.
         """
-        if frame.empty:
-            columns_of_cells: list[list[str]] = []
-        else:
-            columns_of_cells = [_format(frame, column) for column in columns]
-        shades = [
-            frame[column.names[0]].tolist() if column.is_shaded else [None] * len(frame) for column in columns
-        ]
+        cells: list[list[str]] = []
+        shades: list[list[float | None]] = []
+        for column in columns if len(frame) else ():
+            cells.append(_format(frame, column))
+            shades.append(frame[column.names[0]].tolist() if column.is_shaded else [None] * len(frame))
         return cls(
             title,
             tuple(column.title for column in columns),
-            tuple(zip(*columns_of_cells, strict=True)),
+            tuple(zip(*cells, strict=True)),
             note,
             sum(column.is_label for column in columns),
             frame,

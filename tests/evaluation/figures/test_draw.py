@@ -1,11 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figures: which ones there are, what they show, and the same bytes each time."""
+"""Figures of a comparison: present where the data allow, with the numbers they draw, the same bytes each time."""
 
 from __future__ import annotations
 
 import io
-import xml.etree.ElementTree as ET
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -14,18 +12,25 @@ from matplotlib.collections import PathCollection
 from PIL import Image
 
 from doorstate.dataset.store import PreparedDataset
-from doorstate.evaluation.figures import confusion_figure, learning_figure, spread_figure, write_figures
-from doorstate.evaluation.plan_figures import error_map, poses_figure
-from doorstate.evaluation.results import load_results
-from doorstate.evaluation.samples_figure import samples_figure
+from doorstate.evaluation.figures.draw import draw_figures
+from doorstate.evaluation.figures.encode import save_figures
+from doorstate.evaluation.figures.errors import common_errors_figure, surest_errors_figure
+from doorstate.evaluation.figures.learning import learning_figure
+from doorstate.evaluation.figures.poses import errors_figure, poses_figure
+from doorstate.evaluation.figures.samples import samples_figure
+from doorstate.evaluation.figures.scores import confusion_figure, spread_figure
+from doorstate.evaluation.manifest import manifest_frame
+from doorstate.evaluation.predictions import load_results
 from doorstate.types import STATES
+from tests.evaluation.conftest import MakeComparison
 
 
 def test_imported_data_have_the_figures_that_need_no_pose(
-    imported: PreparedDataset, make_comparison: Callable[..., Path], tmp_path: Path
+    imported: PreparedDataset, make_comparison: MakeComparison, tmp_path: Path
 ) -> None:
     results = load_results(make_comparison(imported, {"dgcnn": {"open/3": "closed"}}))
-    first = write_figures(results, imported, tmp_path / "figures")
+    first = draw_figures(results, imported)
+    save_figures(first, tmp_path / "figures")
     assert set(first) == {
         "figure2_samples",
         "figure3_misclassified",
@@ -33,19 +38,15 @@ def test_imported_data_have_the_figures_that_need_no_pose(
         "spread",
         "learning_curves",
     }
-    expected = {f"{name}.{ending}" for name in first for ending in ("png", "svg")}
-    assert {path.name for path in (tmp_path / "figures").iterdir()} == expected
-    for name, drawing in first.items():
-        assert (tmp_path / "figures" / f"{name}.svg").read_bytes() == drawing.svg
-        assert b"<dc:date>" not in drawing.svg
-        assert ET.fromstring(drawing.svg).tag.endswith("svg")
-        picture = Image.open(io.BytesIO(drawing.png))
-        assert np.ptp(np.asarray(picture.convert("L"))) > 100
-    assert write_figures(results, imported, tmp_path / "again") == first
+    assert {path.name for path in (tmp_path / "figures").iterdir()} == {f"{name}.png" for name in first}
+    for name, png in first.items():
+        assert (tmp_path / "figures" / f"{name}.png").read_bytes() == png
+        assert np.ptp(np.asarray(Image.open(io.BytesIO(png)).convert("L"))) > 100
+    assert draw_figures(results, imported) == first
 
 
 def test_poses_figure_draws_each_pose_once(simulated: PreparedDataset, imported: PreparedDataset) -> None:
-    figure = poses_figure(simulated)
+    figure = poses_figure(manifest_frame(simulated.rows))
     assert figure is not None
     (axis,) = figure.axes
     assert axis.get_aspect() == 1.0
@@ -54,8 +55,7 @@ def test_poses_figure_draws_each_pose_once(simulated: PreparedDataset, imported:
     expected = {(float(row["x_m"]), float(row["y_m"])) for row in simulated.rows}
     assert {(x, y) for x, y in drawn.tolist()} == expected
     assert len(drawn) == len(expected) == 40
-    assert "40 robot poses" in axis.get_title()
-    assert poses_figure(imported) is None
+    assert poses_figure(manifest_frame(imported.rows)) is None
 
 
 def test_samples_figure_has_picture_and_cloud_of_each_state_and_region(simulated: PreparedDataset) -> None:
@@ -73,10 +73,10 @@ def test_a_missing_sample_is_named(simulated: PreparedDataset) -> None:
     assert texts == ["no such sample"]
 
 
-def test_error_map_counts_errors(simulated: PreparedDataset, make_comparison: Callable[..., Path]) -> None:
+def test_map_of_errors_counts_them(simulated: PreparedDataset, make_comparison: MakeComparison) -> None:
     wrong = {"dgcnn": {simulated.rows[k]["sample_id"]: "closed" for k in (2, 4, 5)}}
     results = load_results(make_comparison(simulated, wrong))
-    figure = error_map(results, simulated)
+    figure = errors_figure(results)
     assert figure is not None
     titles = [axis.get_title() for axis in figure.axes]
     assert titles == ["pointnet: 0 misclassified", "dgcnn: 3 misclassified"]
@@ -84,14 +84,37 @@ def test_error_map_counts_errors(simulated: PreparedDataset, make_comparison: Ca
     assert sum(markers) == 3
 
 
-def test_no_error_map_without_errors(
-    simulated: PreparedDataset, make_comparison: Callable[..., Path]
+def test_figures_of_errors_show_each_method_and_shared_ones(
+    simulated: PreparedDataset, make_comparison: MakeComparison
 ) -> None:
-    assert error_map(load_results(make_comparison(simulated)), simulated) is None
+    poses = [row["pose_id"] for row in simulated.rows[::3]]
+    wrong = {
+        "dgcnn": {f"{pose}-open": "closed" for pose in poses[3:10]},
+        "pointnet": {f"{poses[3]}-open": "semi_open"},
+    }
+    results = load_results(make_comparison(simulated, wrong))
+    surest = surest_errors_figure(results, simulated)
+    assert surest is not None
+    labels = [axis.get_ylabel().split() for axis in surest.axes if axis.get_ylabel()]
+    assert [label[:2] for label in labels] == [["pointnet", "1"], ["dgcnn", "7"]]
+    assert sum(bool(axis.get_title()) for axis in surest.axes) == 6, "five of a method at most"
+    common = common_errors_figure(results, simulated)
+    assert common is not None
+    (title,) = [axis.get_title() for axis in common.axes if axis.get_title()]
+    assert "pointnet, dgcnn" in title
+
+
+def test_no_figures_of_errors_without_errors(
+    simulated: PreparedDataset, make_comparison: MakeComparison
+) -> None:
+    results = load_results(make_comparison(simulated))
+    assert errors_figure(results) is None
+    assert surest_errors_figure(results, simulated) is None
+    assert common_errors_figure(results, simulated) is None
 
 
 def test_confusion_figure_prints_the_counts(
-    imported: PreparedDataset, make_comparison: Callable[..., Path]
+    imported: PreparedDataset, make_comparison: MakeComparison
 ) -> None:
     results = load_results(make_comparison(imported, {"dgcnn": {"open/3": "closed"}}))
     texts = [[text.get_text() for text in axis.texts] for axis in confusion_figure(results).axes]
@@ -99,23 +122,21 @@ def test_confusion_figure_prints_the_counts(
 
 
 def test_spread_figure_shows_each_finished_fold(
-    imported: PreparedDataset, make_comparison: Callable[..., Path]
+    imported: PreparedDataset, make_comparison: MakeComparison
 ) -> None:
     results = load_results(make_comparison(imported, missing=[("dgcnn", 0)]))
-    axis = spread_figure(results, imported).axes[0]
+    axis = spread_figure(results).axes[0]
     assert [len(np.atleast_1d(line.get_xdata())) for line in axis.lines] == [2, 5, 1, 2, 4, 1]
 
 
-def test_learning_figure_without_logs(
-    imported: PreparedDataset, make_comparison: Callable[..., Path]
-) -> None:
+def test_learning_figure_without_logs(imported: PreparedDataset, make_comparison: MakeComparison) -> None:
     folder = make_comparison(imported)
     for log in (folder / "runs" / "pointnet").rglob("log.csv"):
         log.unlink()
     top_left, top_right = learning_figure(load_results(folder)).axes[:2]
     assert [text.get_text() for text in top_left.texts] == ["no log"]
     assert list(top_right.texts) == []
-    # Training and validation loss of five folds, and a dot at the kept epoch of each.
+    # Training and validation loss of five folds, and a dot at the selected epoch of each.
     assert len(top_right.lines) == 20
     dots = [line for line in top_right.lines if line.get_linestyle() == "None"]
     assert {float(np.asarray(line.get_xdata())[0]) for line in dots} == {2.0}
