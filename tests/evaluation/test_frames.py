@@ -20,8 +20,8 @@ from doorstate.viewer.frame_page import choose_frames
 
 
 @pytest.fixture(scope="module")
-def predictors(viewer: Predictor) -> Predictors:
-    return {"net": viewer, "plane_state": Predictor.load(rule="plane_state")}
+def predictors(weights: Path) -> Predictors:
+    return {"net": Predictor.load(weights), "plane_state": Predictor.load(rule="plane_state")}
 
 
 def broken() -> Points:

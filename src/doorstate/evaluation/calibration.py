@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from doorstate.evaluation.comparison import PROBABILITY_COLUMNS, Results
-from doorstate.evaluation.metrics import Floats, mean_and_deviation, ratio
+from doorstate.evaluation.metrics import Floats, label_codes, mean_and_deviation, ratio
 from doorstate.training.calibration import at_temperature, fit_temperature
 from doorstate.types import NO_DOOR, STATES, Indices
 
@@ -59,7 +59,7 @@ class Calibration(NamedTuple):
 
 def labels_and_probabilities(predictions: pd.DataFrame) -> tuple[Indices, Floats]:
     """Return (N,) true labels and (N, 3) probabilities of rows with a door."""
-    labels = pd.Index(STATES).get_indexer(predictions["state"]).astype(np.int64)
+    labels = label_codes(predictions["state"], STATES)
     return labels, predictions[list(PROBABILITY_COLUMNS)].to_numpy(dtype=np.float64)
 
 

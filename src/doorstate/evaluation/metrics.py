@@ -35,9 +35,14 @@ def confusion(predictions: pd.DataFrame) -> Indices:
 
 def confusion_cells(predictions: pd.DataFrame) -> Indices:
     """Return for each row its cell of a flattened (3, 4) confusion matrix, -1 for a sample without a door."""
-    state = pd.Index(STATES).get_indexer(predictions["state"]).astype(np.int64)
-    predicted = pd.Index(PREDICTED_LABELS).get_indexer(predictions["predicted"]).astype(np.int64)
+    state = label_codes(predictions["state"], STATES)
+    predicted = label_codes(predictions["predicted"], PREDICTED_LABELS)
     return np.where((state >= 0) & (predicted >= 0), state * len(PREDICTED_LABELS) + predicted, -1)
+
+
+def label_codes(values: pd.Series[str], labels: Sequence[str]) -> Indices:
+    """Return the (N,) positions of values among labels, -1 for a value that is none of them."""
+    return pd.Index(labels).get_indexer(pd.Index(values)).astype(np.int64)
 
 
 def ratio(numerator: ArrayLike, denominator: ArrayLike) -> Floats:

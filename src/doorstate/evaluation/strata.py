@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from doorstate.dataset.strata import BANDS, REGIONS
 from doorstate.evaluation.comparison import Results
 from doorstate.evaluation.manifest import text_column
-from doorstate.evaluation.metrics import confusion_cells, ratio, scores
+from doorstate.evaluation.metrics import confusion_cells, label_codes, ratio, scores
 from doorstate.types import NO_DOOR, PREDICTED_LABELS, STATES, Indices
 
 ALL = "all"
@@ -30,7 +30,7 @@ def count_samples(manifest: pd.DataFrame) -> pd.DataFrame:
         Columns state, region, one a band, all.
     """
     states = [*STATES, *([NO_DOOR] if (manifest["state"] == NO_DOOR).any() else [])]
-    codes = pd.Index(states).get_indexer(manifest["state"])
+    codes = label_codes(manifest["state"], states)
     grid = _with_sums(_count(manifest, codes, len(states)))
     grid = np.concatenate([grid, grid.sum(axis=-1, keepdims=True)], axis=-1)  # (6, 5, states + 1)
     rows = [
@@ -83,8 +83,8 @@ def _count(frame: pd.DataFrame, codes: ArrayLike, num_codes: int) -> Indices:
     """Count N rows by region, band and code (an integer each); rows outside the strata are left out."""
     inside = _in_strata(frame).to_numpy()
     counts = np.zeros((len(REGIONS), len(BANDS), num_codes), dtype=np.int64)
-    region = pd.Index(list(REGIONS)).get_indexer(frame["region"][inside])
-    band = pd.Index(BANDS).get_indexer(frame["distance_band"][inside])
+    region = label_codes(frame["region"][inside], list(REGIONS))
+    band = label_codes(frame["distance_band"][inside], BANDS)
     np.add.at(counts, (region, band, np.asarray(codes)[inside]), 1)
     return counts
 
