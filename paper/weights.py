@@ -14,11 +14,11 @@ from pathlib import Path
 from statistics import median
 
 import numpy as np
-from doorstate.evaluation.heads import head_rows
 
 from doorstate._files import write_text
 from doorstate.evaluation.calibration import calibrate, labels_and_probabilities, reliability
 from doorstate.evaluation.comparison import Results
+from doorstate.evaluation.heads import head_rows
 from doorstate.evaluation.resolution import fewest_points, score_resolution
 from doorstate.networks.weights import load_weights, save_weights
 from doorstate.training.calibration import abstain_threshold, at_temperature

@@ -7,9 +7,9 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import pandas as pd
-from doorstate.evaluation.pairwise import correct_by_method
 
 from doorstate.evaluation.comparison import Results
+from doorstate.evaluation.pairwise import correct_by_method
 from doorstate.types import ABSTAINED
 
 Case = Callable[[pd.DataFrame], "pd.Series[bool]"]

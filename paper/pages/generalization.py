@@ -6,12 +6,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from doorstate.evaluation.heads import score_four_labels, score_heads, score_presence
-from doorstate.evaluation.method_scores import summarize_methods
-from doorstate.evaluation.undecidable import decidable_accuracy
-
 from doorstate.evaluation.comparison import Results
 from doorstate.evaluation.factors import ANGLE, OCCLUSION, score_factors
+from doorstate.evaluation.heads import score_four_labels, score_heads, score_presence
+from doorstate.evaluation.method_scores import summarize_methods
 from doorstate.evaluation.table import (
     Table,
     count_column,
@@ -21,6 +19,7 @@ from doorstate.evaluation.table import (
     number_column,
 )
 from doorstate.evaluation.transfer import score_transfer, transfer_grid
+from doorstate.evaluation.undecidable import decidable_accuracy
 
 from ..definition import read_definition
 from ..paths import TITLES

@@ -7,11 +7,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import pandas as pd
+
+from doorstate.evaluation.comparison import Results
 from doorstate.evaluation.method_scores import summarize_methods
 from doorstate.evaluation.rule_outputs import score_angles
 from doorstate.evaluation.strata import ALL
-
-from doorstate.evaluation.comparison import Results
 from doorstate.evaluation.table import Table, count_column, interval_column, number_column
 from doorstate.types import ABSTAINED
 

@@ -8,10 +8,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import pandas as pd
-from doorstate.evaluation.method_scores import MACRO, score_states, summarize_methods
 
 from doorstate.evaluation.calibration import score_calibration
 from doorstate.evaluation.comparison import Results
+from doorstate.evaluation.method_scores import MACRO, score_states, summarize_methods
 from doorstate.evaluation.resolution import score_resolution
 from doorstate.evaluation.study import Study
 from doorstate.evaluation.table import (

@@ -5,10 +5,10 @@ from __future__ import annotations
 
 from io import BytesIO
 
-from doorstate.evaluation.figures.samples import draw_cloud, part_legend
 from matplotlib.figure import Figure
 
 from doorstate.dataset.store import open_dataset
+from doorstate.evaluation.figures.samples import draw_cloud, part_legend
 from doorstate.evaluation.views import STATE_WORDS, picture_axes
 from doorstate.types import STATES
 
