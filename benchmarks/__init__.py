@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Speed of the networks and of the whole way from a raw cloud to a state: `python -m benchmarks --help`."""
+"""Speed of networks, rules, predictors and the service: `python -m benchmarks --help`."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The ways to compute one network that are compared, and how each is built in its worker."""
+"""Forms of a network: the package's, its plain twin from the tests, a public port, PyTorch Geometric's."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _PLAIN_FORMS = Path(__file__).resolve().parents[1] / "tests" / "networks"
 
 
 class Form(NamedTuple):
-    """One way to compute a network: ours, its plain twin of the tests, a public port, PyTorch Geometric's."""
+    """One implementation of a network, with its precision and options."""
 
     name: str
     kind: Literal["fast", "plain", "port", "pyg"]
@@ -32,17 +32,17 @@ class Form(NamedTuple):
 
 PLAIN, PORT, PYG = Form("plain fp32", "plain"), Form("port", "port"), Form("pyg", "pyg")
 BASELINES = (PLAIN, PORT, PYG)
-# Like with like: ports keep to 20 neighbours, DGCNN takes 40 from 2048 points on.
-AS_PORTS: dict[str, dict[str, Any]] = {"dgcnn": {"k": 20}}
+# Ports use 20 neighbours for any number of points, while DGCNN here uses 40 from 2048 points on.
+PORT_OPTIONS: dict[str, dict[str, Any]] = {"dgcnn": {"k": 20}}
 
 
 def forms_of(network: str, port: bool, pyg: bool, compiled: bool = False) -> list[Form]:
-    """Forms a network is timed in, in the order in which they alternate."""
+    """Return the forms of a network in the order in which they alternate."""
     bf16 = has_fast_bf16()
     best = "fast bf16" if bf16 else "fast fp32"
     forms = [Form("fast fp32", "fast")]
     forms += [Form("fast bf16", "fast", bf16=True)] if bf16 else []
-    # PointNet looks at no neighbours.
+    # PointNet uses no neighbours.
     forms += [Form(f"{best}, neighbours cached", "fast", bf16, cached=True)] if network != "pointnet" else []
     forms += [Form(f"{best}, compiled", "fast", bf16, compiled=True)] if compiled else []
     forms.append(PLAIN)
@@ -52,7 +52,7 @@ def forms_of(network: str, port: bool, pyg: bool, compiled: bool = False) -> lis
 
 
 def build_form(form: Form, network: str, checkout: Path | None, points: Tensor) -> nn.Module:
-    """An untrained module with `training_loss(points, labels)` and `forward(points)`.
+    """Return an untrained module with `training_loss(points, labels)` and `forward(points)`.
 
     Raises:
         RunError: a port or package is missing.
@@ -61,23 +61,23 @@ def build_form(form: Form, network: str, checkout: Path | None, points: Tensor) 
         return build_port(network, checkout)
     if form.kind == "pyg":
         return build_pyg(network)
-    ours = create_network(network, **AS_PORTS.get(network, {}))
+    module = create_network(network, **PORT_OPTIONS.get(network, {}))
     if form.kind == "plain":
-        return plain_form(ours)
+        return plain_form(module)
     if form.compiled:
-        ours.__dict__["training_loss"] = compile_if_possible(ours.training_loss)
-    return _WithNeighbours(ours, points) if form.cached else ours
+        module.__dict__["training_loss"] = compile_if_possible(module.training_loss)
+    return _WithNeighbours(module, points) if form.cached else module
 
 
 def plain_form(network: PointNetwork) -> nn.Module:
-    """The twin that the tests compare a network with, every neighbourhood gathered."""
+    """Return the plain twin of a network from the tests, which gathers every neighbourhood."""
     sys.path.insert(0, str(_PLAIN_FORMS))
     plain: nn.Module = import_module("plain_networks").PlainForm(network)
     return plain
 
 
 class _WithNeighbours(nn.Module):
-    """A network that is told the neighbours of one training batch."""
+    """Network with cached neighbours of one training batch."""
 
     def __init__(self, network: PointNetwork, points: Tensor) -> None:
         super().__init__()
@@ -85,5 +85,5 @@ class _WithNeighbours(nn.Module):
         self.neighbourhoods = network.neighbourhoods(points)
 
     def training_loss(self, points: Tensor, labels: Tensor) -> tuple[Tensor, Tensor]:
-        """As the network's."""
+        """Return the network's loss and logits."""
         return self.network.training_loss(points, labels, neighbourhoods=self.neighbourhoods)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Nearest neighbours in feature space, DGCNN's floor: ours against a full product and scikit-learn's brute force."""
+"""Nearest neighbours in the feature space of DGCNN: `knn` beside a full matrix product and scikit-learn."""
 
 from __future__ import annotations
 
@@ -13,9 +13,8 @@ from threadpoolctl import threadpool_limits
 from torch import Tensor
 
 from benchmarks.clouds import Clouds
-from benchmarks.store import Group
-from benchmarks.tables import milliseconds
-from benchmarks.timing import step_s
+from benchmarks.store import Result
+from benchmarks.timing import format_ms, median_seconds
 from doorstate._jobs import Progress
 from doorstate.evaluation.table import Table
 from doorstate.networks.dgcnn import DGCNN
@@ -26,27 +25,25 @@ from doorstate.training.run import torch_threads
 K = 20
 _SEED = 0
 _NOTE = (
-    f"Milliseconds for the {K} nearest neighbours of every point of one cloud, median of the rounds, in "
-    "which the methods take turns; ours is told, as in the network, that near points follow each other. "
-    "The features are those of an untrained DGCNN on a simulated cloud: 64 channels after its first edge "
-    "convolution, 128 after its third."
+    f"Milliseconds for the {K} nearest neighbours of every point of one cloud, median of the rounds, in which the "
+    "methods alternate; `doorstate` gets the points in an order in which neighbours are close, as in the network. The features "
+    "are those of an untrained DGCNN on a simulated cloud: 64 channels after its first edge convolution, 128 after its "
+    "third."
 )
 
 
 def full_product(features: Tensor) -> Tensor:
-    """Every squared distance by one matrix product, then a selection, as the authors' code does."""
+    """Return the neighbours by one matrix product of all pairs and a selection, as in the authors' code."""
     squares = features.square().sum(-1)
     distances = squares.unsqueeze(2) - 2 * features @ features.mT + squares.unsqueeze(1)
     return distances.topk(K, largest=False).indices
 
 
 def brute_force(features: Tensor) -> Tensor:
-    """scikit-learn's."""
+    """Return the neighbours by scikit-learn's brute force."""
     rows = features[0].numpy()
-    found = (
-        NearestNeighbors(n_neighbors=K, algorithm="brute").fit(rows).kneighbors(rows, return_distance=False)
-    )
-    return torch.from_numpy(found).unsqueeze(0)
+    search = NearestNeighbors(n_neighbors=K, algorithm="brute").fit(rows)
+    return torch.from_numpy(search.kneighbors(rows, return_distance=False)).unsqueeze(0)
 
 
 METHODS: dict[str, Callable[[Tensor], Tensor]] = {
@@ -56,38 +53,36 @@ METHODS: dict[str, Callable[[Tensor], Tensor]] = {
 }
 
 
-def measure(
+def measure_neighbours(
     clouds: Clouds, numbers_of_points: Sequence[int], repeats: int, threads: int, progress: Progress
-) -> list[Group]:
-    """Milliseconds of every method."""
+) -> list[Result]:
+    """Return the times of every method."""
     rows = []
     torch.manual_seed(_SEED)
     network = DGCNN(k=K).eval()
     with torch.inference_mode(), torch_threads(threads), threadpool_limits(threads):
-        for done, num_points in enumerate(numbers_of_points):
-            progress(done, len(numbers_of_points))
-            points = torch.from_numpy(clouds.cut(num_points).points)
+        for number, num_points in enumerate(numbers_of_points):
+            progress(number, len(numbers_of_points))
+            points = torch.from_numpy(clouds.first_points(num_points).points)
             order, nearest = network.neighbourhoods(points)
             first, _, third, _ = network.edge_features(gather_rows(points, order), nearest)
             for features in (first.clone(), third.clone()):
-                rounds = [_one_round(features) for _ in range(repeats)]
-                medians = {name: median(one[name] for one in rounds) for name in METHODS}
-                rows.append(
-                    {"points": num_points, "channels": features.shape[-1], "ms": medians, "rounds": rounds}
-                )
+                rounds = [_measure_round(features) for _ in range(repeats)]
+                medians = {name: median(values[name] for values in rounds) for name in METHODS}
+                rows.append({"points": num_points, "channels": features.shape[-1], "ms": medians})
     progress(len(numbers_of_points), len(numbers_of_points))
     return rows
 
 
-def _one_round(features: Tensor) -> dict[str, float]:
-    return {name: step_s(partial(method, features)) * 1000 for name, method in METHODS.items()}
-
-
-def knn_table(rows: Sequence[Group]) -> Table:
-    """One row per number of points and channels."""
+def neighbours_table(rows: Sequence[Result]) -> Table:
+    """Return one row per number of points and channels."""
     cells = [
-        (str(row["points"]), str(row["channels"]), *(milliseconds(row["ms"][name]) for name in METHODS))
+        (str(row["points"]), str(row["channels"]), *(format_ms(row["ms"][name]) for name in METHODS))
         for row in rows
     ]
     title = f"The {K} nearest neighbours in feature space"
     return Table(title, ("points", "channels", *METHODS), tuple(cells), _NOTE, text_columns=0)
+
+
+def _measure_round(features: Tensor) -> dict[str, float]:
+    return {name: median_seconds(partial(method, features)) * 1000 for name, method in METHODS.items()}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Speed of the networks; the forms of one take turns, so that their ratios hold on a noisy machine."""
+"""Speed of the networks. The forms of a network alternate, so that their ratios hold on a machine with other load."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from statistics import median
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from benchmarks.clouds import Clouds
 from benchmarks.forms import BASELINES, Form, forms_of
-from benchmarks.store import Group, Store
-from benchmarks.subjects import OperationCount, Subject, Task
-from benchmarks.tables import networks_table
-from benchmarks.timing import MatrixPeak
+from benchmarks.measured_network import MeasuredNetwork, NetworkTask, OperationCount
+from benchmarks.networks_table import networks_table
+from benchmarks.store import Result, Store
+from benchmarks.timing import MatrixSpeed
 from benchmarks.workers import Worker
 from doorstate._jobs import Progress
 from doorstate.errors import RunError
@@ -23,159 +23,173 @@ from doorstate.evaluation.table import Table
 from doorstate.training.environment import has_fast_bf16
 
 INFERENCE_BATCHES = (1, 16)
-Round = dict[str, float]  # train_ms, infer_1_ms, infer_16_ms per cloud, and peak_gflops of the round
+Round = dict[str, float]
+"""`training_ms`, `inference_1_ms` and `inference_16_ms` per cloud, and `peak_gflops` of the machine in this round."""
 
 
 class Plan(NamedTuple):
-    """How everything is measured."""
+    """Settings of all measurements."""
 
     batch: int
     repeats: int
     threads: int
-    checkouts: dict[str, Path]
+    checkouts: dict[str, Path]  # of ports, by network
     pyg: bool
     same_allocator: bool
     compiled: bool = False
 
     def forms(self, network: str) -> list[Form]:
-        """Forms of a network under this plan."""
+        """Return the forms of a network."""
         return forms_of(network, network in self.checkouts, self.pyg, self.compiled)
 
 
-def run(
+def measure_networks(
     plan: Plan,
-    wanted: Sequence[tuple[str, int]],
-    draw: Callable[[], Clouds],
+    pairs: Sequence[tuple[str, int]],
+    load_clouds: Callable[[], Clouds],
     store: Store,
     progress: Progress,
 ) -> None:
-    """Measure what the store does not hold yet, network by network and number by number of points.
+    """Measure networks at numbers of points, and save after each; stored results without failures are kept.
 
-    A group with a row that failed is measured again.
+    Args:
+        plan: settings.
+        pairs: network and number of points.
+        load_clouds: called if something is to be measured.
+        store: results.
+        progress: called with measured and all rounds of forms.
     """
-    missing = [pair for pair in wanted if not _finished(store.groups.get(_key(*pair)))]
+    missing = [pair for pair in pairs if not _is_complete(store.results.get(_key(*pair)))]
     if not missing:
-        store.save(table_of(store, wanted, plan))
+        store.save(table_of(store, pairs, plan))
         return
-    clouds, done = draw(), 0
+    clouds, done = load_clouds(), 0
     total = sum(plan.repeats * len(plan.forms(network)) for network, _ in missing)
     progress(done, total)
 
-    def tick() -> None:
+    def advance() -> None:
         nonlocal done
         done += 1
         progress(done, total)
 
-    with Worker(MatrixPeak, plan.threads) as peak:
+    with Worker(MatrixSpeed, plan.threads) as matrix_speed:
         for network, points in missing:
-            store.groups[_key(network, points)] = _measure(plan, network, clouds.cut(points), peak, tick)
-            store.save(table_of(store, wanted, plan))
+            store.results[_key(network, points)] = _measure(
+                plan, network, clouds.first_points(points), matrix_speed, advance
+            )
+            store.save(table_of(store, pairs, plan))
+
+
+def table_of(store: Store, pairs: Sequence[tuple[str, int]], plan: Plan) -> Table:
+    """Return the table of these networks, followed by the other stored results."""
+    keys = dict.fromkeys([_key(*pair) for pair in pairs] + list(store.results))
+    results = [store.results[key] for key in keys if key in store.results]
+    return networks_table(results, plan.same_allocator)
 
 
 def _key(network: str, points: int) -> str:
     return f"{network} {points}"
 
 
-def _finished(group: Group | None) -> bool:
-    return group is not None and not any("reason" in row for row in group["rows"])
+def _is_complete(result: Result | None) -> bool:
+    return result is not None and not any("reason" in row for row in result["rows"])
 
 
-def table_of(store: Store, wanted: Sequence[tuple[str, int]], plan: Plan) -> Table:
-    """Groups asked for now, in that order, and then what was measured before."""
-    keys = dict.fromkeys([_key(*pair) for pair in wanted] + list(store.groups))
-    groups = [store.groups[key] for key in keys if key in store.groups]
-    return networks_table(groups, plan.same_allocator)
-
-
-class _Contestant:
-    """One form in its worker, and what was measured of it; after its first failure it takes no more turns."""
+class _FormRounds:
+    """Measurements of one form in its worker; after the first failure it is not measured again."""
 
     def __init__(self, form: Form, worker: Worker) -> None:
         self.form, self._worker = form, worker
         self.rounds: list[Round] = []
         self.memory_mib = math.nan
         self.threads = 0
-        self.reason = ""
+        self.failure = ""
 
-    def get_ready(self) -> None:
-        """Wait until its worker has imported and built everything."""
+    def wait_until_ready(self) -> None:
+        """Wait until the worker has imported and built everything."""
         try:
             self.threads = self._worker.call("threads")
         except RunError as error:
-            self.reason = str(error)
+            self.failure = str(error)
 
-    def take_turn(self, batch: int, peak_gflops: float) -> None:
-        """One round: a sample of training, and of inference unless neighbours are given."""
-        if self.reason:
+    def measure_round(self, batch: int, peak_gflops: float) -> None:
+        """Measure training, and inference unless neighbours are cached."""
+        if self.failure:
             return
         try:
-            found = {"train_ms": self._worker.call("train_s") * 1000 / batch}
+            measured = {"training_ms": self._worker.call("training_seconds") * 1000 / batch}
             self.memory_mib = self._worker.call("memory_mib")
-            if not (self.form.cached or self.form.compiled):  # a new cloud's neighbours are not known
+            if not (self.form.cached or self.form.compiled):  # new clouds have no cached neighbours
                 for clouds in INFERENCE_BATCHES:
-                    found[f"infer_{clouds}_ms"] = self._worker.call("infer_s", clouds) * 1000 / clouds
-            self.rounds.append(found | {"peak_gflops": peak_gflops})
+                    seconds = self._worker.call("inference_seconds", clouds)
+                    measured[f"inference_{clouds}_ms"] = seconds * 1000 / clouds
+            self.rounds.append(measured | {"peak_gflops": peak_gflops})
         except RunError as error:
-            self.reason = str(error)
+            self.failure = str(error)
 
 
-def _measure(plan: Plan, network: str, clouds: Clouds, peak: Worker, tick: Callable[[], None]) -> Group:
+def _measure(
+    plan: Plan, network: str, clouds: Clouds, matrix_speed: Worker, advance: Callable[[], None]
+) -> Result:
     with Worker(OperationCount, network, clouds) as counter:
         gflop = counter.call("training_gflop")
     precisions = (False, True) if has_fast_bf16() else (False,)
     with ExitStack() as stack:
-        contestants = [
-            _Contestant(form, stack.enter_context(Worker(Subject, _task(plan, network, form, clouds))))
+        measured_forms = [
+            _FormRounds(
+                form, stack.enter_context(Worker(MeasuredNetwork, _task(plan, network, form, clouds)))
+            )
             for form in plan.forms(network)
         ]
-        # Workers that still import would take the processor from what is timed.
-        for contestant in contestants:
-            contestant.get_ready()
+        # Imports in other workers would take processor time from the measurement.
+        for measured in measured_forms:
+            measured.wait_until_ready()
         for _ in range(plan.repeats):
-            peaks = {bf16: peak.call("gflops", bf16) for bf16 in precisions}
-            for contestant in contestants:
-                contestant.take_turn(plan.batch, peaks[contestant.form.bf16])
-                tick()
+            peaks = {bf16: matrix_speed.call("gflops", bf16) for bf16 in precisions}
+            for measured in measured_forms:
+                measured.measure_round(plan.batch, peaks[measured.form.bf16])
+                advance()
     return {
         "network": network,
         "points": clouds.points.shape[1],
         "training_gflop_per_cloud": gflop,
-        "rows": [_row(contestant, contestants, gflop) for contestant in contestants],
+        "rows": [_row(measured, measured_forms, gflop) for measured in measured_forms],
     }
 
 
-def _task(plan: Plan, network: str, form: Form, clouds: Clouds) -> Task:
+def _task(plan: Plan, network: str, form: Form, clouds: Clouds) -> NetworkTask:
     checkout = plan.checkouts.get(network)
-    return Task(network, form, clouds, plan.batch, plan.threads, checkout, plan.same_allocator)
+    return NetworkTask(network, form, clouds, plan.batch, plan.threads, checkout, plan.same_allocator)
 
 
-def _row(contestant: _Contestant, contestants: Sequence[_Contestant], gflop: float) -> dict[str, Any]:
-    if contestant.reason:
-        return {"form": contestant.form.name, "reason": contestant.reason}
-    own = contestant.rounds
-    reached = [gflop / (one["train_ms"] / 1000) for one in own]
+def _row(measured: _FormRounds, all_forms: Sequence[_FormRounds], gflop: float) -> Result:
+    if measured.failure:
+        return {"form": measured.form.name, "reason": measured.failure}
+    rounds = measured.rounds
+    gflops = [gflop / (values["training_ms"] / 1000) for values in rounds]
+    shares = [rate / values["peak_gflops"] for rate, values in zip(gflops, rounds, strict=True)]
     return {
-        "form": contestant.form.name,
-        "threads": contestant.threads,
-        "rounds": own,
-        **{name: median(one[name] for one in own) for name in own[0]},
-        "memory_mib": contestant.memory_mib,
-        "train_gflops": median(reached),
-        "share_of_peak": median(rate / one["peak_gflops"] for rate, one in zip(reached, own, strict=True)),
+        "form": measured.form.name,
+        "threads": measured.threads,
+        "rounds": rounds,
+        **{name: median(values[name] for values in rounds) for name in rounds[0]},
+        "memory_mib": measured.memory_mib,
+        "training_gflops": median(gflops),
+        "share_of_peak": median(shares),
         "speedups": {
-            other.form.name: _speedups(own, other.rounds)
-            for other in contestants
-            if other.form in BASELINES and other is not contestant and not other.reason
+            baseline.form.name: _speedups(rounds, baseline.rounds)
+            for baseline in all_forms
+            if baseline.form in BASELINES and baseline is not measured and not baseline.failure
         },
     }
 
 
-def _speedups(own: list[Round], baseline: list[Round]) -> dict[str, float]:
-    """How many times the baseline's time of the same round, median over the rounds."""
-    names = [name for name in own[0] if name.endswith("_ms")]
+def _speedups(rounds: list[Round], baseline_rounds: list[Round]) -> dict[str, float]:
+    """Return the time of the baseline divided by that of the form, as the median over rounds."""
+    names = [name for name in rounds[0] if name.endswith("_ms")]
     return {
         name.removesuffix("_ms"): median(
-            theirs[name] / ours[name] for ours, theirs in zip(own, baseline, strict=True)
+            baseline[name] / values[name] for values, baseline in zip(rounds, baseline_rounds, strict=True)
         )
         for name in names
     }

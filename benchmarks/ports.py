@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Public ports of three networks, used from a checkout as their users use them; nothing of them is kept here."""
+"""Public ports of three networks, loaded from a checkout; none of their code is in this repository."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ _FILES = {
 
 
 def build_port(network: str, checkout: Path) -> nn.Module:
-    """A port with the methods of our networks.
+    """Return a port with the methods of our networks.
 
     Raises:
         RunError: there is no checkout of the port.
     """
     file = checkout / _FILES[network]
     if not file.is_file():
-        raise RunError(f"{checkout}: no checkout of {REPOSITORIES[network]}, {_FILES[network]} is missing")
+        raise RunError(f"no checkout of {REPOSITORIES[network]}: {_FILES[network]} is missing", path=checkout)
     return _DGCNNPort(file) if network == "dgcnn" else _PointNetPort(file)
 
 
@@ -41,18 +41,18 @@ class _PointNetPort(nn.Module):
 
     def __init__(self, file: Path) -> None:
         super().__init__()
-        sys.path.insert(0, str(file.parent))  # its files import each other by bare names
+        sys.path.insert(0, str(file.parent))  # its modules import each other without a package
         module: Any = import_module(file.stem)
         self.network = module.get_model(len(STATES), normal_channel=False)
         self.loss = module.get_loss()
 
     def forward(self, points: Tensor) -> Tensor:
-        """(B, 3) log probabilities of (B, N, 3) points."""
+        """Return (B, 3) log probabilities of (B, N, 3) points."""
         logits: Tensor = self.network(points.mT)[0]
         return logits
 
     def training_loss(self, points: Tensor, labels: Tensor) -> tuple[Tensor, Tensor]:
-        """Its own loss, and the log probabilities."""
+        """Return the port's own loss and the log probabilities."""
         logits, features = self.network(points.mT)
         return self.loss(logits, labels, features), logits
 
@@ -62,7 +62,7 @@ class _DGCNNPort(nn.Module):
 
     def __init__(self, file: Path) -> None:
         super().__init__()
-        # It asks for the first GPU wherever its input is: this one expression is replaced as the file is read.
+        # The port always takes the first GPU; this expression is replaced by the device of the input.
         source = file.read_text(encoding="utf-8").replace("torch.device('cuda')", "x.device")
         module = ModuleType("dgcnn_port")
         exec(compile(source, str(file), "exec"), module.__dict__)
@@ -73,11 +73,11 @@ class _DGCNNPort(nn.Module):
         self.network = build(arguments, output_channels=len(STATES))
 
     def forward(self, points: Tensor) -> Tensor:
-        """(B, 3) logits of (B, N, 3) points."""
-        logits: Tensor = self.network(points.mT.contiguous())  # it takes a view of it
+        """Return (B, 3) logits of (B, N, 3) points."""
+        logits: Tensor = self.network(points.mT.contiguous())  # the port takes a view
         return logits
 
     def training_loss(self, points: Tensor, labels: Tensor) -> tuple[Tensor, Tensor]:
-        """Cross entropy, and the logits."""
+        """Return cross entropy and logits."""
         logits = self(points)
         return functional.cross_entropy(logits, labels), logits

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The same architectures put together from PyTorch Geometric's modules, where it is installed."""
+"""The same architectures built from modules of PyTorch Geometric, if it is installed."""
 
 from __future__ import annotations
 
@@ -18,31 +18,31 @@ Batch = tuple[Tensor, Tensor]  # (B * N, 3) positions, (B * N,) cloud of each
 
 
 def build_pyg(network: str) -> nn.Module:
-    """A network with the methods of ours.
+    """Return a network with the methods of ours.
 
     Raises:
         RunError: PyTorch Geometric is not installed.
     """
     if util.find_spec("torch_geometric") is None:
         raise RunError("torch_geometric is not installed")
-    built: nn.Module = NETWORKS[network](import_module("torch_geometric.nn"))
-    return built
+    module: nn.Module = NETWORKS[network](import_module("torch_geometric.nn"))
+    return module
 
 
 class _Network(nn.Module):
-    """Clouds one after another in one tensor, as PyTorch Geometric wants them."""
+    """Network on clouds that are concatenated in one tensor, as in PyTorch Geometric."""
 
     def forward(self, points: Tensor) -> Tensor:
-        """(B, 3) logits of (B, N, 3) points."""
+        """Return (B, 3) logits of (B, N, 3) points."""
         batch, num_points, _ = points.shape
         return self.logits(points.flatten(0, 1), torch.arange(batch).repeat_interleave(num_points))
 
     def logits(self, positions: Tensor, batch: Tensor) -> Tensor:
-        """(B, 3) of (B * N, 3)."""
+        """Return (B, 3) logits of (B * N, 3) positions."""
         raise NotImplementedError
 
     def training_loss(self, points: Tensor, labels: Tensor) -> tuple[Tensor, Tensor]:
-        """Cross entropy, and the logits."""
+        """Return cross entropy and logits."""
         logits = self(points)
         return functional.cross_entropy(logits, labels), logits
 
@@ -68,13 +68,15 @@ class _PointNet2(_Network):
     def _level(
         self, conv: nn.Module, features: Tensor | None, points: Batch, centres: int, radius: float, slots: int
     ) -> tuple[Tensor, Batch]:
-        chosen = _farthest(self.pyg, points, centres)
-        picked = (points[0][chosen], points[1][chosen])
+        indices = _farthest(self.pyg, points, centres)
+        centre_points = (points[0][indices], points[1][indices])
         centre, point = self.pyg.radius(
-            points[0], picked[0], radius, points[1], picked[1], max_num_neighbors=slots
+            points[0], centre_points[0], radius, points[1], centre_points[1], max_num_neighbors=slots
         )
-        own = None if features is None else features[chosen]
-        return conv((features, own), (points[0], picked[0]), torch.stack([point, centre])), picked
+        centre_features = None if features is None else features[indices]
+        edges = torch.stack([point, centre])
+        rows = conv((features, centre_features), (points[0], centre_points[0]), edges)
+        return rows, centre_points
 
 
 class _DGCNN(_Network):
@@ -102,7 +104,7 @@ class _DGCNN(_Network):
 
 
 class _PointCNN(_Network):
-    """PointCNN with four levels, on `XConv`, which finds neighbours of every point and not of the chosen alone."""
+    """PointCNN with four levels, on `XConv`, which searches neighbours of all points and not only of the centres."""
 
     _LEVELS = ((0, 48, 8, 24, 1), (48, 96, 12, 12, 2), (96, 192, 16, 24, 2), (192, 384, 16, 48, 3))
     _CENTRES = (None, 384, 128, None)
@@ -120,8 +122,8 @@ class _PointCNN(_Network):
         points, features = (positions, batch), None
         for conv, centres in zip(self.convs, self._CENTRES, strict=True):
             if centres is not None and features is not None:
-                chosen = _farthest(self.pyg, points, centres)
-                points, features = (points[0][chosen], points[1][chosen]), features[chosen]
+                indices = _farthest(self.pyg, points, centres)
+                points, features = (points[0][indices], points[1][indices]), features[indices]
             features = functional.elu(conv(features, *points))
         logits: Tensor = self.head(self.pyg.global_mean_pool(features, points[1]))
         return logits
@@ -131,10 +133,10 @@ NETWORKS = {"pointnet2": _PointNet2, "dgcnn": _DGCNN, "pointcnn": _PointCNN}
 
 
 def _farthest(pyg: Any, points: Batch, count: int) -> Tensor:
-    """Row numbers of `count` points per cloud in farthest-point order."""
+    """Return the indices of `count` points per cloud in farthest-point order."""
     per_cloud = len(points[1]) // (int(points[1][-1]) + 1)
-    chosen: Tensor = pyg.fps(*points, ratio=min(1.0, count / per_cloud))
-    return chosen
+    indices: Tensor = pyg.fps(*points, ratio=min(1.0, count / per_cloud))
+    return indices
 
 
 def _mlp(*channels: int, slope: float = 0.0, bias: bool = True) -> nn.Sequential:

@@ -1,42 +1,81 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How long a step takes, how much memory it needs, and how quick this machine's matrix product is."""
+"""Durations, memory and matrix speed: every benchmark measures with these functions."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from statistics import median
+from types import ModuleType
+from typing import Any
+from unittest.mock import patch
 
+import numpy as np
 import torch
 
-_ENOUGH_S = 1.0
-_ENOUGH_STEPS = 3
+_MIN_DURATION_S = 1.0
+_MAX_STEPS = 3
 _MATRIX_SIZE = 2048
 _PRODUCTS = 4
 
 
-def step_s(step: Callable[[], object], warm_up: bool = True) -> float:
-    """Median seconds of a step: three steps, or as many as begin within a second, after one that does not count."""
+def median_seconds(step: Callable[[], object], warm_up: bool = True) -> float:
+    """Return the median duration of a step.
+
+    Args:
+        step: run three times, or until one second has passed.
+        warm_up: run it once before, without measuring.
+    """
     if warm_up:
         step()
     seconds: list[float] = []
-    while len(seconds) < _ENOUGH_STEPS and sum(seconds) < _ENOUGH_S:
+    while len(seconds) < _MAX_STEPS and sum(seconds) < _MIN_DURATION_S:
         started = time.perf_counter()
         step()
         seconds.append(time.perf_counter() - started)
     return median(seconds)
 
 
-class MatrixPeak:
-    """The quickest of a few products of two 2048 x 2048 matrices, made in a process of its own."""
+@contextmanager
+def timed_calls(module: ModuleType, name: str) -> Iterator[list[float]]:
+    """Yield a list that receives the milliseconds of every call of one function through a module."""
+    function, durations_ms = getattr(module, name), []
+
+    def timed(*arguments: Any, **options: Any) -> Any:
+        started = time.perf_counter()
+        result = function(*arguments, **options)
+        durations_ms.append((time.perf_counter() - started) * 1000)
+        return result
+
+    with patch.object(module, name, timed):
+        yield durations_ms
+
+
+def summarize_ms(durations_ms: Sequence[float]) -> dict[str, float]:
+    """Return median, 90th percentile and maximum of durations in milliseconds."""
+    return {
+        "median_ms": float(np.median(durations_ms)),
+        "p90_ms": float(np.percentile(durations_ms, 90)),
+        "max_ms": max(durations_ms),
+    }
+
+
+def format_ms(value: float) -> str:
+    """Format milliseconds with three digits, and at most two decimals."""
+    return f"{value:.{2 if value < 10 else 1 if value < 100 else 0}f}"
+
+
+class MatrixSpeed:
+    """Speed of products of two 2048 x 2048 matrices, measured in a process of its own."""
 
     def __init__(self, threads: int) -> None:
         torch.set_num_threads(threads)
         self._matrix = torch.randn(_MATRIX_SIZE, _MATRIX_SIZE, generator=torch.Generator().manual_seed(0))
 
     def gflops(self, bf16: bool) -> float:
-        """GFLOP/s, a multiplication and an addition being two operations."""
+        """Return the highest of a few measurements in GFLOP/s; a multiply-add counts as two operations."""
         matrix = self._matrix.bfloat16() if bf16 else self._matrix
         matrix @ matrix
         seconds: list[float] = []
@@ -48,23 +87,23 @@ class MatrixPeak:
 
 
 def resident_mib(process: int | str = "self") -> float:
-    """Memory a process occupies now, this one if not given; NaN where /proc does not tell."""
+    """Return the memory of a process, by default of this one; NaN where /proc has no such value."""
     return _status_mib("VmRSS", process)
 
 
 def peak_resident_mib() -> float:
-    """The most it occupied since the last `reset_peak`."""
-    return _status_mib("VmHWM")
+    """Return the highest memory of this process since the last `reset_peak`."""
+    return _status_mib("VmHWM", "self")
 
 
 def reset_peak() -> None:
-    """Begin a new peak, from what is occupied now (proc(5), clear_refs)."""
-    clear = Path("/proc/self/clear_refs")
-    if clear.exists():
-        clear.write_text("5")
+    """Set the highest memory to the current one (proc(5), clear_refs)."""
+    clear_refs = Path("/proc/self/clear_refs")
+    if clear_refs.exists():
+        clear_refs.write_text("5")
 
 
-def _status_mib(field: str, process: int | str = "self") -> float:
+def _status_mib(field: str, process: int | str) -> float:
     status = Path(f"/proc/{process}/status")
     lines = status.read_text(encoding="utf-8").splitlines() if status.exists() else []
     kib = [int(line.split()[1]) for line in lines if line.startswith(field + ":")]

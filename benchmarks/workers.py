@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""An object in a process of its own, called over a pipe; what goes wrong there is one line here."""
+"""An object in a process of its own, called over a pipe; its exceptions arrive as one line."""
 
 from __future__ import annotations
 
@@ -19,31 +19,33 @@ class _Failure(NamedTuple):
 
 
 class Worker:
-    """A process that builds one object and calls its methods, one at a time, until it is closed."""
+    """Process that builds one object and calls its methods one at a time, until it is closed."""
 
     def __init__(self, factory: Callable[..., object], *arguments: Any) -> None:
-        # spawn: nothing of this process's memory, threads or allocator state is inherited.
+        # spawn: the process inherits no memory, threads or allocator state.
         context = multiprocessing.get_context("spawn")
-        self._connection, theirs = context.Pipe()
-        self._process = context.Process(target=_serve, args=(theirs, factory, arguments), daemon=True)
+        self._connection, child_connection = context.Pipe()
+        self._process = context.Process(
+            target=_serve, args=(child_connection, factory, arguments), daemon=True
+        )
         self._process.start()
-        theirs.close()
+        child_connection.close()
 
     def call(self, method: str, *arguments: Any) -> Any:
-        """Answer of a method.
+        """Return the result of a method.
 
         Raises:
             RunError: the object could not be built, the method failed, or the process died.
         """
         try:
             self._connection.send((method, arguments))
-            answer = self._connection.recv()
+            result = self._connection.recv()
         except (EOFError, OSError):
             self._process.join()
-            raise RunError(_cause_of_death(self._process.exitcode)) from None
-        if isinstance(answer, _Failure):
-            raise RunError(answer.reason)
-        return answer
+            raise RunError(_describe_exit(self._process.exitcode)) from None
+        if isinstance(result, _Failure):
+            raise RunError(result.reason)
+        return result
 
     def close(self) -> None:
         """End the process."""
@@ -58,31 +60,32 @@ class Worker:
 
 
 def _serve(connection: Connection, factory: Callable[..., object], arguments: tuple[Any, ...]) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides, and workers print no tracebacks
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent handles it, and workers print no tracebacks
     score = Path("/proc/self/oom_score_adj")
     if score.exists():
         with suppress(OSError):
-            score.write_text("1000")  # when memory runs out, a worker is to die, not the benchmark
-    served: object = None
+            score.write_text("1000")  # without memory the kernel should kill a worker, not the benchmark
+    instance: object = None
     while True:
         try:
-            method, given = connection.recv()
+            method, method_arguments = connection.recv()
         except EOFError:
             return
         try:
-            served = factory(*arguments) if served is None else served
-            answer = getattr(served, method)(*given)
+            instance = factory(*arguments) if instance is None else instance
+            result = getattr(instance, method)(*method_arguments)
         except Exception as error:  # a port may raise anything
-            answer = _Failure(_one_line(error))
-        connection.send(answer)
+            result = _Failure(_one_line(error))
+        connection.send(result)
 
 
 def _one_line(error: Exception) -> str:
     lines = str(error).strip().splitlines()
-    return lines[0] if isinstance(error, RunError) else f"{type(error).__name__}: {lines[0] if lines else ''}"
+    first = lines[0] if lines else ""
+    return first if isinstance(error, RunError) else f"{type(error).__name__}: {first}"
 
 
-def _cause_of_death(exit_code: int | None) -> str:
+def _describe_exit(exit_code: int | None) -> str:
     if exit_code is not None and exit_code < 0:
         name = signal.Signals(-exit_code).name
         return f"killed by {name}" + (": out of memory?" if name == "SIGKILL" else "")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What lives in a worker: one network in one form, trained, asked and profiled on one batch."""
+"""One network in one form, measured in a worker: training, inference, memory, operators."""
 
 from __future__ import annotations
 
@@ -14,31 +14,31 @@ from torch.utils._python_dispatch import TorchDispatchMode
 from torch.utils.flop_counter import flop_registry
 
 from benchmarks.clouds import Clouds
-from benchmarks.forms import AS_PORTS, Form, build_form, plain_form
-from benchmarks.timing import peak_resident_mib, reset_peak, resident_mib, step_s
+from benchmarks.forms import PORT_OPTIONS, Form, build_form, plain_form
+from benchmarks.timing import median_seconds, peak_resident_mib, reset_peak, resident_mib
 from doorstate._memory import keep_freed_memory
 from doorstate.networks import create_network
 
-_SLOW_S = 1.0
+_LONG_STEP_S = 1.0
 _SEED = 0
 
 
-class Task(NamedTuple):
-    """Everything a worker needs to know; `clouds` are normalised."""
+class NetworkTask(NamedTuple):
+    """Everything that a worker needs; the clouds are normalised."""
 
     network: str
     form: Form
     clouds: Clouds
     batch: int
     threads: int
-    checkout: Path | None = None
+    checkout: Path | None = None  # of a port
     same_allocator: bool = False
 
 
-class Subject:
+class MeasuredNetwork:
     """One network in one form."""
 
-    def __init__(self, task: Task) -> None:
+    def __init__(self, task: NetworkTask) -> None:
         torch.set_num_threads(task.threads)
         if task.form.kind == "fast" or task.same_allocator:
             keep_freed_memory()
@@ -52,56 +52,57 @@ class Subject:
         self._last_s: dict[str, float] = {}
         self._memory_mib: float | None = None
 
-    def train_s(self) -> float:
-        """Seconds of a training step: loss, gradients, AdamW."""
+    def training_seconds(self) -> float:
+        """Measure a training step: loss, gradients, AdamW."""
         self._module.train()
         before = resident_mib()
         reset_peak()
-        seconds = self._sample("train", self.training_step)
+        seconds = self._measure("training", self.train_step)
         if self._memory_mib is None:
             self._memory_mib = peak_resident_mib() - before
         return seconds
 
     def memory_mib(self) -> float:
-        """How far memory grew in the first training steps of this process, at its highest."""
+        """Return the highest growth of memory in the first training steps of this process."""
         return float("nan") if self._memory_mib is None else self._memory_mib
 
-    def infer_s(self, batch: int) -> float:
-        """Seconds to classify so many clouds together."""
+    def inference_seconds(self, batch: int) -> float:
+        """Measure the classification of a batch."""
         self._module.eval()
-        return self._sample(f"infer {batch}", lambda: self.inference(batch))
+        return self._measure(f"inference {batch}", lambda: self.infer(batch))
 
     def threads(self) -> int:
-        """Threads torch uses in here."""
+        """Return the number of threads of torch in this process."""
         return torch.get_num_threads()
 
-    def training_step(self) -> None:
-        """One step on the batch."""
+    def train_step(self) -> None:
+        """Run one training step."""
         self._optimizer.zero_grad(set_to_none=True)
         with self._autocast():
             loss: Tensor = self._module.training_loss(self._points, self._labels)[0]  # type: ignore[operator]
         loss.backward()  # type: ignore[no-untyped-call]
         self._optimizer.step()
 
-    def inference(self, batch: int) -> None:
-        """Logits of the first clouds."""
+    def infer(self, batch: int) -> None:
+        """Compute the logits of a batch."""
         with torch.inference_mode(), self._autocast():
             self._module(self._clouds[:batch])
 
     def profile(self, training: bool, steps: int = 2) -> list[tuple[str, float]]:
-        """Operators and the milliseconds per step they spent themselves, the longest first."""
+        """Return operators with their own milliseconds per step, longest first."""
         self._module.train(training)
-        step = self.training_step if training else lambda: self.inference(1)
+        step = self.train_step if training else lambda: self.infer(1)
         step()
         with torch.profiler.profile(activities=[torch.profiler.ProfilerActivity.CPU]) as profiler:
             for _ in range(steps):
                 step()
-        found = [(event.key, event.self_cpu_time_total / 1000 / steps) for event in profiler.key_averages()]
-        return sorted(found, key=lambda item: -item[1])
+        events = profiler.key_averages()
+        operators = [(event.key, event.self_cpu_time_total / 1000 / steps) for event in events]
+        return sorted(operators, key=lambda operator: -operator[1])
 
-    def _sample(self, name: str, step: Callable[[], object]) -> float:
-        # A step of many seconds is not warmer for another one before it.
-        seconds = step_s(step, warm_up=self._last_s.get(name, 0.0) < _SLOW_S)
+    def _measure(self, name: str, step: Callable[[], object]) -> float:
+        # A step of several seconds needs no warm-up after the first round.
+        seconds = median_seconds(step, warm_up=self._last_s.get(name, 0.0) < _LONG_STEP_S)
         self._last_s[name] = seconds
         return seconds
 
@@ -110,21 +111,24 @@ class Subject:
 
 
 class OperationCount:
-    """Operations of the plain form's products on one cloud."""
+    """Number of operations of a network's plain form."""
 
     def __init__(self, network: str, clouds: Clouds) -> None:
-        self._form = plain_form(create_network(network, **AS_PORTS.get(network, {})).eval())
+        self._form = plain_form(create_network(network, **PORT_OPTIONS.get(network, {})).eval())
         self._points = torch.from_numpy(clouds.points[:1])
 
     def training_gflop(self) -> float:
-        """2 operations per multiply-add of the forward pass, times 3: backward takes twice as many."""
+        """Return GFLOP of a training step on one cloud.
+
+        A multiply-add counts as 2 operations, and the backward pass as twice the forward pass.
+        """
         with _Products() as products:
             self._form(self._points)
         return float(3 * products.operations / 1e9)
 
 
 class _Products(TorchDispatchMode):  # type: ignore[no-untyped-call]
-    """Counts operations of products that a gradient may flow through, so not those of neighbour search."""
+    """Counter of the operations of products with gradients, which leaves out the search for neighbours."""
 
     def __init__(self) -> None:
         super().__init__()  # type: ignore[no-untyped-call]
