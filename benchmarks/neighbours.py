@@ -26,9 +26,9 @@ K = 20
 _SEED = 0
 _NOTE = (
     f"Milliseconds for the {K} nearest neighbours of every point of one cloud, median of the rounds, in which the "
-    "methods alternate; `doorstate` gets the points in an order in which neighbours are close, as in the network. The "
-    "features are those of an untrained DGCNN on a simulated cloud: 64 channels after its first edge convolution, 128 after "
-    "its third."
+    "methods alternate; `doorstate` gets the points in an order in which neighbours are close, as in the network. "
+    "The features are those of an untrained DGCNN on a simulated cloud: 64 channels after its first edge "
+    "convolution, 128 after its third."
 )
 
 

@@ -87,8 +87,8 @@ def test_networks_without_earlier_weights_start_from_random_weights(
 
 def test_weights_trained_on_test_samples_are_refused(small_dataset: PreparedDataset, tmp_path: Path) -> None:
     prepare_comparison(experiment(small_dataset), tmp_path / "first")
-    other = experiment(small_dataset, protocol="all", folds=1)
-    prepare_comparison(other, tmp_path / "all")
+    everything = experiment(small_dataset, protocol="all", folds=1)
+    prepare_comparison(everything, tmp_path / "all")
     for name, is_refused in (("first", False), ("all", True)):
         again = experiment(small_dataset, start_from=str(tmp_path / name))
         with pytest.raises(RunError, match=r"all.*start_from") if is_refused else nullcontext():

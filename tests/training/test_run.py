@@ -129,8 +129,8 @@ def test_saved_weights_give_the_saved_predictions(finished: Path, small_dataset:
         cloud = small_dataset.cloud(small_dataset.index_of(row["sample_id"]))[:128]
         with torch.no_grad():
             probabilities = network(torch.from_numpy(normalize(cloud))[None]).softmax(1)[0].numpy()
-        found = [float(row[f"p_{state}"]) for state in ("closed", "semi_open", "open")]
-        np.testing.assert_allclose(found, probabilities, atol=2e-5)
+        saved = [float(row[f"p_{state}"]) for state in ("closed", "semi_open", "open")]
+        np.testing.assert_allclose(saved, probabilities, atol=2e-5)
 
 
 def test_finished_run_is_not_trained_again(
