@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Augmentation keeps what tells a door's state: distances, angles and what is up."""
+"""Augmentation keeps the state of the door: distances, angles and the vertical."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def linear_of(augmentation: Augmentation, seed: int = 0, clouds: int = 300) -> N
 
 
 def angles(points: NDArray[np.float32]) -> NDArray[np.float64]:
-    """Angle at the second of every three points in turn."""
+    """Return the angle at the second of each three successive points."""
     one, other = points[:, :-2] - points[:, 1:-1], points[:, 2:] - points[:, 1:-1]
     lengths = np.linalg.norm(one, axis=-1) * np.linalg.norm(other, axis=-1)
     return np.arccos(np.clip((one * other).sum(axis=-1) / lengths, -1, 1)).astype(np.float64)
@@ -40,20 +40,20 @@ def handedness(points: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def test_defaults_change_nothing() -> None:
-    found = augmented(Augmentation())
-    assert found.dtype == np.float32
-    np.testing.assert_array_equal(found, POINTS)
+    changed = augmented(Augmentation())
+    assert changed.dtype == np.float32
+    np.testing.assert_array_equal(changed, POINTS)
 
 
 @given(seed=seeds)
 @settings(deadline=None, max_examples=20)
 def test_yaw_keeps_heights_distances_and_handedness(seed: int) -> None:
-    found = augmented(Augmentation(yaw_deg=180), seed)
-    np.testing.assert_array_equal(found[..., 2], POINTS[..., 2])
-    for before, after in zip(POINTS, found, strict=True):
+    changed = augmented(Augmentation(yaw_deg=180), seed)
+    np.testing.assert_array_equal(changed[..., 2], POINTS[..., 2])
+    for before, after in zip(POINTS, changed, strict=True):
         np.testing.assert_allclose(pdist(after), pdist(before), rtol=1e-5, atol=1e-6)
-    np.testing.assert_array_equal(handedness(found), handedness(POINTS))
-    assert np.abs(found - POINTS).max() > 0.01
+    np.testing.assert_array_equal(handedness(changed), handedness(POINTS))
+    assert np.abs(changed - POINTS).max() > 0.01
 
 
 def test_rotations_are_rotations_within_their_range() -> None:
@@ -82,24 +82,24 @@ def test_a_tilt_is_small_and_a_rotation() -> None:
 @given(seed=seeds)
 @settings(deadline=None, max_examples=20)
 def test_scale_keeps_angles_and_so_the_doors(seed: int) -> None:
-    found = augmented(Augmentation(scale=(0.5, 2.0)), seed)
-    np.testing.assert_allclose(angles(found), angles(POINTS), atol=2e-3)
-    factor = found[:, 0, 0] / POINTS[:, 0, 0]
+    changed = augmented(Augmentation(scale=(0.5, 2.0)), seed)
+    np.testing.assert_allclose(angles(changed), angles(POINTS), atol=2e-3)
+    factor = changed[:, 0, 0] / POINTS[:, 0, 0]
     assert ((factor > 0.499) & (factor < 2.001)).all()
     assert np.ptp(factor) > 0.01  # each cloud its own
 
 
 def test_a_scale_of_the_height_alone_keeps_angles_seen_from_above() -> None:
-    found = augmented(Augmentation(scale_z=(0.8, 0.9)))
-    np.testing.assert_array_equal(found[..., :2], POINTS[..., :2])
-    ratio = found[..., 2] / POINTS[..., 2]
+    changed = augmented(Augmentation(scale_z=(0.8, 0.9)))
+    np.testing.assert_array_equal(changed[..., :2], POINTS[..., :2])
+    ratio = changed[..., 2] / POINTS[..., 2]
     assert 0.799 < ratio.min() <= ratio.max() < 0.901
 
 
 def test_a_mirror_flips_left_and_right_with_its_probability() -> None:
-    found = augmented(Augmentation(mirror=1.0))
-    np.testing.assert_array_equal(found, POINTS * np.array([1, -1, 1], np.float32))
-    np.testing.assert_array_equal(handedness(found), -handedness(POINTS))
+    changed = augmented(Augmentation(mirror=1.0))
+    np.testing.assert_array_equal(changed, POINTS * np.array([1, -1, 1], np.float32))
+    np.testing.assert_array_equal(handedness(changed), -handedness(POINTS))
     mirrored = np.linalg.det(linear_of(Augmentation(mirror=0.3), clouds=2000)) < 0
     assert mirrored.mean() == pytest.approx(0.3, abs=0.04)
 

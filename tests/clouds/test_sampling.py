@@ -127,7 +127,7 @@ def test_starts_at_the_point_farthest_from_below_and_behind(choose: Choose) -> N
 
 @st.composite
 def clouds(draw: st.DrawFn) -> Points:
-    """Random, on a coarse lattice (ties), with every point repeated, all in one place, or tiny."""
+    """Random clouds, on a coarse lattice (ties), with repeated points, in one place, or tiny."""
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
     count = draw(st.sampled_from([1, 2, 3, 4, 5, 17, 300, 2047, 5000]))
     kind = draw(st.sampled_from(["random", "lattice", "plane", "repeated", "one place", "off centre"]))
@@ -199,7 +199,7 @@ def test_the_first_points_of_a_sampled_cloud_are_its_sample(length: int, prefix:
         points = simulated_cloud(index, 2048)[:length]
         own, largest = distances_to_earlier(points, np.arange(prefix))
         assert own == largest
-        # Sampled anew, a level scene's ties may fall otherwise, and nothing else.
+        # Sampling again may only break the ties of a level scene differently.
         assert (farthest_point_indices(points, prefix) == np.arange(prefix)).mean() > 0.99
     points = random_cloud(6, 5000)[farthest_point_indices(random_cloud(6, 5000), length)]
     np.testing.assert_array_equal(farthest_point_indices(points, prefix), np.arange(prefix))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""NumPy files: round trips, the choice among several arrays, and headers that lie."""
+"""NumPy files: round trips, archives of several arrays, false headers."""
 
 from __future__ import annotations
 
@@ -46,11 +46,11 @@ def test_round_trip(array: NDArray[Any], fortran: bool) -> None:
 
 
 @pytest.mark.parametrize("name", ["points", "cloud", "xyz", "depth"])
-def test_a_named_array_is_found_among_others(name: str) -> None:
+def test_a_named_array_is_read_among_others(name: str) -> None:
     np.testing.assert_array_equal(parse_npz(_npz(a=np.zeros(3), b=np.zeros(2), **{name: POINTS})), POINTS)
 
 
-def test_points_go_before_depth() -> None:
+def test_points_are_preferred_to_depth() -> None:
     np.testing.assert_array_equal(parse_npz(_npz(depth=np.zeros((4, 40)), points=POINTS)), POINTS)
 
 
@@ -90,7 +90,7 @@ def test_objects_are_never_unpickled() -> None:
         parse_npy(stream.getvalue())
 
 
-def test_more_declared_than_held_is_truncated() -> None:
+def test_false_declared_sizes_are_refused() -> None:
     with pytest.raises(CloudReadError, match="48 bytes are declared, 47 are there"):
         parse_npy(_npy(POINTS)[:-1])
     with pytest.raises(CloudReadError, match="-48 bytes are declared"):
@@ -101,6 +101,6 @@ def test_a_member_that_unpacks_to_gigabytes_is_not_unpacked() -> None:
     stream = io.BytesIO(_npz(points=POINTS))
     with zipfile.ZipFile(stream, "a") as archive:
         archive.getinfo("points.npy").file_size = 3 << 30
-        archive.writestr("note.txt", "makes the directory be written anew")
+        archive.writestr("note.txt", "forces a new directory")
     with pytest.raises(CloudReadError, match="unpacks to 3221225472 bytes"):
         parse_npz(stream.getvalue())

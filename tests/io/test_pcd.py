@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""PCD: pypcd4 writes, we read; we write, pypcd4 reads; old, odd and damaged headers."""
+"""PCD files exchanged with pypcd4; old, unusual and damaged headers."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_reads_what_pypcd4_writes(tmp_path: Path, encoding: Encoding) -> None:
 
 @given(points=_clouds)
 @settings(deadline=None, max_examples=50)
-def test_writes_every_float32_so_that_it_comes_back(
+def test_every_float32_survives_writing_and_reading(
     tmp_path_factory: pytest.TempPathFactory, points: NDArray[np.float32]
 ) -> None:
     path = tmp_path_factory.mktemp("pcd") / "a.pcd"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""PLY: files by trimesh and by hand, in all encodings, with whatever may stand around the vertices."""
+"""PLY files by trimesh and by hand, in all encodings, with other elements around the vertices."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def test_every_float32_survives_every_encoding(points: NDArray[np.float32]) -> N
 
 
 @pytest.mark.parametrize(("encoding", "order"), [("binary_little_endian", "<"), ("binary_big_endian", ">")])
-def test_other_properties_and_elements_are_passed_over(encoding: str, order: str) -> None:
+def test_other_properties_and_elements_are_skipped(encoding: str, order: str) -> None:
     elements = (
         "obj_info made by hand\nelement camera 2\nproperty double f\nproperty uchar id\nelement vertex 3\n"
         "property uchar red\nproperty double z\nproperty float32 x\nproperty int16 label\nproperty float y\n"

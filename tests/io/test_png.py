@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Depth PNG: PIL writes, we read; colour, 8-bit and damaged images are told apart."""
+"""Depth PNG files by PIL; colour, 8-bit and damaged images."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""PointCloud2: NumPy's record arrays lay points out, we read them; messages that contradict themselves."""
+"""PointCloud2 messages made with NumPy record arrays; contradictory messages."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ MESSAGE: dict[str, Any] = {
 
 @st.composite
 def messages(draw: st.DrawFn) -> tuple[dict[str, Any], NDArray[np.float64]]:
-    """A message with its values, at any offsets and with rubbish between them."""
+    """Message with its values, at random offsets with random bytes between them."""
     height, width = draw(st.integers(1, 4)), draw(st.integers(1, 5))
     order = draw(st.sampled_from("<>"))
     place, fields, formats = 0, [], []

@@ -67,7 +67,7 @@ def test_no_rows_are_no_points(text: str) -> None:
 @pytest.mark.parametrize(
     "text", ["file,state\na.pcd,open\n", "1 2\n3 4\n", "1 2 3\n4 5\n", "x,y,z\n1,2,wall\n"]
 )
-def test_anything_else_is_an_error(text: str) -> None:
+def test_other_texts_are_errors(text: str) -> None:
     with pytest.raises(CloudReadError, match="rows of numbers, or a header naming x, y, z"):
         parse_table(text.encode())
 
