@@ -62,12 +62,6 @@ def test_targets_are_in_the_units_of_the_normalised_cloud() -> None:
     assert all(values.dtype == np.float32 for values in targets.values())
 
 
-def test_truth_is_read_from_nested_columns_of_published_manifests() -> None:
-    row = WITHOUT_DOOR | {"hinge": "", "door.hinge": "right", "door.opening_width_m": "0.9"}
-    assert HEADS["hinge"].truth([row]).tolist() == [[0]]
-    assert HEADS["widths"].truth([row])[0, 0] == 0.9
-
-
 def test_only_the_named_heads_have_targets() -> None:
     assert list(head_targets([ROW], np.zeros((1, 3), np.float32), ["widths", "parts"])) == ["widths"]
 

@@ -16,9 +16,6 @@ from doorstate.errors import DatasetError
 _UNITS = ("_m", "_deg", "_px", "_share")
 """Endings of the names of columns that hold numbers."""
 
-_SAME = {"hinge": "door.hinge", "opening_width_m": "door.opening_width_m"}
-"""Columns that data sets of one door keep among the settings of that door."""
-
 
 def read_manifest(folder: Path) -> pd.DataFrame:
     """Read the manifest of a data set folder as `manifest_frame` returns it.
@@ -47,9 +44,6 @@ def manifest_frame(rows: Sequence[Mapping[str, str]]) -> pd.DataFrame:
         if column not in frame:
             raise DatasetError("column is missing", field=column)
     frame = frame.where((frame != "") | (frame.columns == "sample_id"))
-    for column, own in _SAME.items():
-        if own in frame:
-            frame[column] = frame[column].fillna(frame[own]) if column in frame else frame[own]
     for column in frame.columns:
         if column.endswith(_UNITS):
             frame[column] = frame[column].map(float, na_action="ignore").astype("float64")

@@ -22,7 +22,7 @@ def _auroc(columns: Floats, truth: Floats, states: States) -> float:
 DOOR_HEAD = HeadSpec(
     name=DOOR,
     description="probability of a door",
-    columns=(Column("p_door", "", manifest=("state",), parse=lambda state: float(state != NO_DOOR)),),
+    columns=(Column("p_door", "", manifest="state", parse=lambda state: float(state != NO_DOOR)),),
     num_outputs=1,
     decode=sigmoid,
     loss=binary_cross_entropy,

@@ -41,7 +41,7 @@ def _accuracy_not_closed(columns: Floats, truth: Floats, states: States) -> floa
 HINGE_HEAD = HeadSpec(
     name="hinge",
     description="probability that the hinge is on the left",
-    columns=(Column("p_hinge_left", "", manifest=("hinge", "door.hinge"), parse=_parse),),
+    columns=(Column("p_hinge_left", "", manifest="hinge", parse=_parse),),
     num_outputs=1,
     decode=sigmoid,
     loss=binary_cross_entropy,

@@ -31,14 +31,13 @@ class Column:
 
     name: str
     unit: str  # "m", "deg", or "" for a probability
-    manifest: tuple[str, ...] = ()  # the first filled column counts; the column's own name if empty
+    manifest: str = ""  # column of the manifest; the same name if empty
     parse: Callable[[str], float] = float
 
     def truth(self, rows: Sequence[ManifestRow]) -> Floats:
         """Return the (M,) true values of manifest rows, NaN where there is none."""
-        names = self.manifest or (self.name,)
-        cells = (next((row[name] for name in names if row.get(name)), None) for row in rows)
-        return np.array([math.nan if cell is None else self.parse(cell) for cell in cells])
+        texts = (row.get(self.manifest or self.name, "") for row in rows)
+        return np.array([self.parse(text) if text else math.nan for text in texts])
 
 
 @dataclass(frozen=True)

@@ -53,7 +53,7 @@ WIDTHS_HEAD = HeadSpec(
     name="widths",
     description=f"widths of the opening and of the free passage, divided by {SCALE_M}",
     columns=(
-        Column("opening_width_m", "m", manifest=("opening_width_m", "door.opening_width_m")),
+        Column("opening_width_m", "m"),
         Column("passable_width_m", "m"),
     ),
     num_outputs=2,
