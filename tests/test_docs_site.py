@@ -60,10 +60,10 @@ def test_every_page_is_in_the_site_and_every_link_leads_somewhere(site: Path) ->
 
 @pytest.mark.slow
 def test_the_reference_has_signatures_and_every_command(site: Path) -> None:
-    answers = (site / "api" / "answers.html").read_text(encoding="utf-8")
+    inference = (site / "api" / "inference.html").read_text(encoding="utf-8")
     for name in ("Predictor", "Predictor.__call__", "Predictor.batch", "Gate", "StateFilter.update"):
-        assert re.search(rf'id="doorstate\.deployment\.\w+\.{re.escape(name)}"', answers), name
-    assert "TypeAliasForwardRef" not in answers
+        assert re.search(rf'id="doorstate\.inference\.\w+\.{re.escape(name)}"', inference), name
+    assert "TypeAliasForwardRef" not in inference
     commands = (site / "commands.html").read_text(encoding="utf-8")
     helped = subprocess.check_output([Path(sys.executable).with_name("doorstate"), "--help"], text=True)
     names = re.findall(r"^  ([a-z]+)  ", helped.partition("Commands:")[2], flags=re.MULTILINE)

