@@ -29,7 +29,7 @@ def gate(
 
     with progress_bar("gate") as progress:
         table = gate_table(measure_gate(network, count, progress))
-    _write(table, out / "gate.md")
+    _write(table, out / "gate.md", network=network)
 
 
 @app.command()
@@ -43,7 +43,7 @@ def thinning(
 
     with progress_bar("thinning") as progress:
         table = thinning_table(measure_thinning(network, count, progress))
-    _write(table, out / "thinning.md")
+    _write(table, out / "thinning.md", network=network)
 
 
 @app.command()
@@ -58,7 +58,7 @@ def sensors(
 
     with progress_bar("sensors") as progress:
         table = sensors_table(measure_sensors(range(frames), progress))
-    _write(table, out / "sensors.md")
+    _write(table, out / "sensors.md", frames=frames)
 
 
 @app.command()
@@ -83,13 +83,18 @@ def export(
     for name in list_networks():
         with progress_bar(name) as progress:
             rows += measure_export(run_of(runs, name, fold).weights, clouds, progress)
-    _write(export_table(rows), out / "onnx.md")
+    _write(export_table(rows), out / "onnx.md", runs=runs, fold=fold, points=points)
 
 
-def _write(table: Table, path: Path) -> None:
+def _write(table: Table, path: Path, **options: object) -> None:
+    """Write a table with the machine, versions and options it was made with."""
     from doorstate._files import write_text
+    from doorstate.training.environment import describe_environment
 
-    write_text(path, table.to_markdown())
+    settings = ", ".join(
+        f"{name} {value}" for name, value in (describe_environment() | options).items() if value != ""
+    )
+    write_text(path, f"{table.to_markdown()}\nMade with {settings}.\n")
     typer.echo(f"{path} written")
 
 
