@@ -61,7 +61,7 @@ def test_predictions_are_scored_and_written(recordings: Path, report: Path, weig
     metrics = json.loads((report / "metrics.json").read_text(encoding="utf-8"))
     correct = {row["method"]: row["correct"] for row in metrics["scores"]}
     assert list(correct)[:2] == ["pointnet", "plane_state"]
-    assert list(metrics["not_read"]) == ["coarse.png"]
+    assert list(metrics["unreadable"]) == ["coarse.png"]
     # Doors without noise at 2 to 3 m are easy for the rule.
     assert correct["plane_state"] >= 5
     with (report / "predictions.csv").open(encoding="utf-8") as file:

@@ -127,4 +127,4 @@ def test_frames_that_most_methods_missed_come_first(results: FrameResults) -> No
     assert misses == sorted(misses, reverse=True)
     wrong_only = choose_frames(results, everything=False)
     assert wrong_only == [number for number in chosen if results.misclassified_by(number)]
-    assert choose_frames(results, everything=True, most=2) == chosen[:2]
+    assert choose_frames(results, everything=True, limit=2) == chosen[:2]

@@ -4,16 +4,19 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from doorstate.cli.options import (
+    Cx,
+    Cy,
     DepthScale,
-    Focal,
     Frame,
+    Fx,
+    Fy,
     IntrinsicsFile,
     LayoutName,
     PointCount,
@@ -24,12 +27,9 @@ from doorstate.cli.options import (
 from doorstate.errors import CloudReadError, ConfigError
 
 if TYPE_CHECKING:
-    from doorstate.evaluation.frame_scores import FrameScores
-    from doorstate.evaluation.frames import FrameResults, Predictors
-    from doorstate.evaluation.table import Table
+    from doorstate.evaluation.frames import Predictors
 
 _DOOR_COLUMN = "door"
-_PAGE = "frames.html"
 
 
 def evaluate(
@@ -72,17 +72,18 @@ def evaluate(
     units: Units = "m",
     depth_scale: DepthScale = 0.001,
     intrinsics: IntrinsicsFile = None,
-    fx: Focal = None,
-    fy: Focal = None,
-    cx: Focal = None,
-    cy: Focal = None,
+    fx: Fx = None,
+    fy: Fy = None,
+    cx: Cx = None,
+    cy: Cy = None,
 ) -> None:
-    """Evaluate networks and rules on clouds or depth images with known states.
+    """Score networks and rules on labelled recordings.
 
-    An index.csv has one row for each file, with the columns file and state. Optional columns are fx, fy, cx, cy,
-    width, height (pixels), depth_unit_m, frame, roll_deg, door, rgb (a colour image to show) and any others. A state
-    other than the three marks a frame without a clear door; such frames are reported separately. The exit code is 1
-    if a file could not be read.
+    Clouds and depth images come with an index of their states, or in one sub-folder for each state. An index.csv has
+    one row for each file, with the columns file and state. Optional columns are fx, fy, cx, cy, width, height
+    (pixels), depth_unit_m, frame, roll_deg, door, rgb (a colour image to show) and any others. A state other than the
+    three marks a frame without a clear door; such frames are reported separately. The exit code is 1 if a file could
+    not be read.
 
     \b
     Examples:
@@ -93,6 +94,7 @@ def evaluate(
     """
     from doorstate._files import check_writable
     from doorstate.cli.console import progress_bar, stderr
+    from doorstate.cli.evaluate_output import PAGE, print_scores, write_report
     from doorstate.dataset.labelled import check_column, labelled_frames
     from doorstate.evaluation.frame_tables import NO_GROUP, frame_notes, frame_tables
     from doorstate.evaluation.frames import evaluate_frames
@@ -106,12 +108,12 @@ def evaluate(
     for column in (*(by or ()), *([group] if group else ())):
         check_column(frames, column.partition(":")[0])
     if out is not None:
-        check_writable(out / _PAGE)
+        check_writable(out / PAGE)
     predictors = _predictors(network, weights, rule, points)
     with progress_bar("Predicting") as progress:
         results = evaluate_frames(predictors, frames, progress)
-    for frame_row, reason in results.unreadable:
-        stderr.print(f"{frame_row.file}: {reason}", style="red", soft_wrap=True)
+    for unreadable, reason in results.unreadable:
+        stderr.print(f"{unreadable.file}: {reason}", style="red", soft_wrap=True)
     if not results.frames:
         raise CloudReadError(f"none of {len(frames)} files could be read", path=folder)
     scores = results.score(group, by or ())
@@ -119,9 +121,9 @@ def evaluate(
     if as_json:
         print(json.dumps(scores.to_json()))  # noqa: T201
     else:
-        _print(tables, notes)
+        print_scores(tables, notes)
     if out is not None:
-        page = _write(out, folder, predictors, results, scores, tables, notes, everything)
+        page = write_report(out, folder, predictors, results, scores, tables, notes, everything)
         stderr.print(f"page: {page}", soft_wrap=True)
     if results.unreadable:
         stderr.print(
@@ -153,48 +155,3 @@ def _predictors(
         name: load_predictor(network, path, rule, None if rule and mixed else points)
         for name, (network, path, rule) in zip(names, choices, strict=True)
     }
-
-
-def _print(tables: Mapping[str, Table], notes: Sequence[str]) -> None:
-    from doorstate.cli.console import print_table, stdout
-
-    for note in notes:
-        stdout.print(note, soft_wrap=True)
-    for table in tables.values():
-        print_table(table.title, table.columns, table.rows)
-        if table.note:
-            stdout.print(table.note, soft_wrap=True)
-
-
-def _write(
-    out: Path,
-    folder: Path,
-    predictors: Predictors,
-    results: FrameResults,
-    scores: FrameScores,
-    tables: Mapping[str, Table],
-    notes: Sequence[str],
-    everything: bool,
-) -> Path:
-    from doorstate import __version__
-    from doorstate._files import write_text
-    from doorstate.cli.console import progress_bar
-    from doorstate.evaluation.tables import save_tables
-    from doorstate.viewer.frame_page import choose_frames, frame_cards, render_frame_page
-
-    name = folder.resolve().name
-    table = results.frame.drop(columns="correct").rename(columns={"sample_id": "file"})
-    write_text(out / "predictions.csv", table.to_csv(index=False, lineterminator="\n", float_format="%.5g"))
-    header: dict[str, Any] = {
-        "doorstate": __version__,
-        "folder": name,
-        "not_read": {frame.file: reason for frame, reason in results.unreadable},
-    }
-    write_text(out / "metrics.json", json.dumps({**header, **scores.to_json()}, indent=2) + "\n")
-    save_tables(tables, out / "tables")
-    chosen = choose_frames(results, everything)
-    with progress_bar("Writing the page") as progress:
-        cards = frame_cards(results, predictors, chosen, progress)
-    page = out / _PAGE
-    write_text(page, render_frame_page(name, tables, results, cards, notes))
-    return page

@@ -32,7 +32,6 @@ Fx = Annotated[float | None, typer.Option(help="Horizontal focal length in pixel
 Fy = Annotated[float | None, typer.Option(help="Vertical focal length in pixels.")]
 Cx = Annotated[float | None, typer.Option(help="Horizontal image centre in pixels.")]
 Cy = Annotated[float | None, typer.Option(help="Vertical image centre in pixels.")]
-Focal = Fx
 LayoutName = Annotated[
     str | None,
     typer.Option("--layout", help="Folder layout of a published data set: deepdoors2 (or DeepDoors)."),

@@ -3,27 +3,22 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from itertools import groupby
 from typing import Any
 
-import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
-from PIL import Image
 
 from doorstate.dataset.store import PreparedDataset
 from doorstate.evaluation.comparison import PROBABILITY_COLUMNS, Results
 from doorstate.evaluation.detections import encode_detections
 from doorstate.evaluation.errors import order_errors
-from doorstate.evaluation.pages import data_uri, encode_cloud
+from doorstate.evaluation.pages import encode_cloud, missed_by, picture_uri
 from doorstate.evaluation.undecidable import is_undecidable
 
 CARDS_PER_METHOD = 16
 _DRAWN_POINTS = 2048
-_PICTURE_PX = (400, 300)
 
 
 @dataclass(frozen=True)
@@ -72,11 +67,6 @@ class Gallery:
         """Names of the shapes over all clouds."""
         by_method = (shapes for methods in self.shapes.values() for shapes in methods.values())
         return sorted({shape["name"] for shapes in by_method for shape in shapes})
-
-
-def missed_by(count: int, methods: int) -> str:
-    """Return the heading of samples that `count` of the methods misclassified."""
-    return f"Missed by {count or 'none'} of {methods}"
 
 
 def build_gallery(results: Results, dataset: PreparedDataset) -> Gallery:
@@ -147,15 +137,6 @@ def _facts(row: pd.Series[Any]) -> list[str]:
     if "same_image_as" in known:
         facts.append(f"same image as {known['same_image_as'].replace(' ', ', ')}")
     return facts
-
-
-def picture_uri(picture: NDArray[np.uint8]) -> str:
-    """Return (H, W, 3) pixels as a small JPEG in a data URI."""
-    image = Image.fromarray(picture)
-    image.thumbnail(_PICTURE_PX)
-    encoded = io.BytesIO()
-    image.save(encoded, format="JPEG", quality=85)
-    return data_uri(encoded.getvalue(), "image/jpeg")
 
 
 def _encode_cloud(dataset: PreparedDataset, index: int) -> dict[str, str | None]:
