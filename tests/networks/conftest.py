@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every test of the networks starts from the same weights."""
+"""Fixed seed for the initial weights of the networks."""
 
 from __future__ import annotations
 

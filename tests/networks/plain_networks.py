@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The five networks written the ordinary way: every neighbourhood gathered, every layer on every neighbour.
+"""The five networks in their plain form: every neighbourhood gathered, every layer on every neighbour.
 
 Oracle of the tests and yardstick of the benchmarks. Only the names of the networks' parameters are used.
 """
@@ -36,7 +36,7 @@ class PlainForm(nn.Module):
     def forward(self, points: Tensor) -> Tensor:
         """(B, num_classes) logits of (B, N, 3) points."""
         features, _ = self.features(self.network, points)
-        if features.dim() == 3:  # PointCNN: one answer per representative point
+        if features.dim() == 3:  # PointCNN: features of representative points
             features = features.to(points.dtype).mean(dim=1)
         return self.network.head(features).to(points.dtype)
 
@@ -56,7 +56,7 @@ def squared_distances(query: Tensor, points: Tensor) -> Tensor:
     """(M, N) of (M, D) and (N, D): exact for coordinates, |q|^2 - 2 q p + |p|^2 for features."""
     if points.shape[1] == 3:
         return sum((query[:, None, axis] - points[None, :, axis]).square() for axis in range(3))
-    origin = points.mean(dim=0)  # or the squares lose the digits that matter
+    origin = points.mean(dim=0)  # far from the origin, squares lose digits
     query, points = query - origin, points - origin
     return query.square().sum(1)[:, None] - 2 * query @ points.T + points.square().sum(1)[None]
 
@@ -64,27 +64,27 @@ def squared_distances(query: Tensor, points: Tensor) -> Tensor:
 @torch.no_grad()
 def knn(query: Tensor, points: Tensor, k: int) -> Tensor:
     """(B, M, k) nearest first; a query equal to the point of the same index finds that point first."""
-    found = []
+    indices = []
     for queries, cloud in zip(query, points, strict=True):
         distances = squared_distances(queries, cloud)
         (same,) = (queries == cloud[: len(queries)]).all(dim=1).nonzero(as_tuple=True)
         distances[same, same] = -torch.inf
-        found.append(distances.topk(min(k, len(cloud)), largest=False).indices)
-    return torch.stack(found)
+        indices.append(distances.topk(min(k, len(cloud)), largest=False).indices)
+    return torch.stack(indices)
 
 
 @torch.no_grad()
 def ball_query(centres: Tensor, points: Tensor, radius: float, num_samples: int) -> Tensor:
     """(B, M, num_samples) first points, in index order, closer than the radius; the first of them pads."""
     num_points = points.shape[1]
-    found = []
+    indices = []
     for queries, cloud in zip(centres, points, strict=True):
         inside = squared_distances(queries, cloud) < radius**2
         hits = torch.where(inside, torch.arange(num_points, device=cloud.device), num_points)
         hits = hits.sort(dim=1).values[:, :num_samples]
         hits = functional.pad(hits, (0, num_samples - hits.shape[1]), value=num_points)
-        found.append(torch.where(hits < num_points, hits, hits[:, :1]))
-    return torch.stack(found)
+        indices.append(torch.where(hits < num_points, hits, hits[:, :1]))
+    return torch.stack(indices)
 
 
 def gather(values: Tensor, indices: Tensor) -> Tensor:
@@ -197,7 +197,7 @@ def elu_dense(rows: Tensor, layers: nn.Sequential) -> Tensor:
 
 
 def depthwise(rows: Tensor, weight: Tensor) -> Tensor:
-    """(B, P, C, m): a convolution of each channel of (B, P, K, C) rows over all K, weight (K, C, m)."""
+    """(B, P, C, m): a convolution of every channel of (B, P, K, C) rows over all K, weight (K, C, m)."""
     k, channels, multiplier = weight.shape
     kernel = weight.permute(1, 2, 0).reshape(-1, 1, 1, k)  # (C * m, 1, 1, K)
     out = functional.conv2d(rows.permute(0, 3, 1, 2), kernel, groups=channels)  # (B, C * m, P, 1)
@@ -282,4 +282,4 @@ _FEATURES: dict[type[PointNetwork], Callable[..., tuple[Tensor, Tensor | float]]
     PointCNN: pointcnn,
     Point2Sequence: point2sequence,
 }
-"""(B, F) or (B, P, F) features of (B, N, 3) points, and what the loss adds to the cross entropy."""
+"""(B, F) or (B, P, F) features of (B, N, 3) points, and the term that the loss adds to the cross entropy."""

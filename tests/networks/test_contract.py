@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What every network promises, for all five."""
+"""The contract of all networks, tested for all five."""
 
 from __future__ import annotations
 
@@ -70,15 +70,15 @@ def test_pretrained_network_has_packaged_weights_and_heads() -> None:
     network = create_network("pointnet2", pretrained=True)
     assert not network.training
     assert "door" in network.heads
-    other = create_network("pointnet2", pretrained="ogurob-pointnet2")
-    assert not torch.equal(network.level1.mlps[0].pool.linear.weight, other.level1.mlps[0].pool.linear.weight)
+    paper = create_network("pointnet2", pretrained="ogurob-pointnet2")
+    assert not torch.equal(network.level1.mlps[0].pool.linear.weight, paper.level1.mlps[0].pool.linear.weight)
     with pytest.raises(ConfigError, match="are for pointnet, not dgcnn"):
         create_network("dgcnn", pretrained="ogurob-pointnet")
     with pytest.raises(ConfigError):
         create_network("dgcnn", pretrained=True, k=3)
 
 
-def test_heavy_modules_are_imported_on_use() -> None:
+def test_cards_and_heads_import_no_torch() -> None:
     code = (
         "import sys, doorstate.networks.card, doorstate.networks.heads, doorstate.networks.packaged; "
         "sys.exit('torch' in sys.modules)"
@@ -161,7 +161,7 @@ def test_autocast_changes_little_in_evaluation(network: PointNetwork) -> None:
     assert (rounded - exact).norm() / exact.norm() < 0.05
 
 
-def test_fewer_centres_are_the_first_and_come_back(network: PointNetwork) -> None:
+def test_fewer_centres_are_the_first_ones_and_can_be_restored(network: PointNetwork) -> None:
     network.eval()
     points = clouds(600)
     with torch.no_grad():
@@ -217,8 +217,8 @@ def test_network_is_one_graph_for_any_batch(name: str) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("training", [True, False])
-def test_every_tensor_is_made_on_the_points_device(name: str, training: bool) -> None:
-    """On torch's meta device, which computes shapes alone and stands for any that is not the CPU."""
+def test_every_tensor_is_created_on_the_device_of_the_points(name: str, training: bool) -> None:
+    """On torch's meta device, which computes shapes only and stands for any device but the CPU."""
     network = create_network(name).train(training)
     neighbourhoods = tuple(index.to("meta") for index in network.neighbourhoods(clouds(128)))
     network.to("meta")

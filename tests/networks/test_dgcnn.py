@@ -63,7 +63,7 @@ def test_running_statistics_are_those_of_all_edges(conv: EdgeConv) -> None:
         torch.testing.assert_close(conv.norm.state_dict()[name], expected, rtol=1e-12, atol=1e-12)
 
 
-def test_a_point_that_is_its_own_only_neighbour_has_no_difference(conv: EdgeConv) -> None:
+def test_a_point_that_is_its_only_neighbour_has_no_difference(conv: EdgeConv) -> None:
     features = torch.randn(2, 30, 6, generator=torch.Generator().manual_seed(0))
     itself = torch.arange(30).view(1, 30, 1).expand(2, -1, 4)
     before = conv.eval()(features, itself)
@@ -72,7 +72,7 @@ def test_a_point_that_is_its_own_only_neighbour_has_no_difference(conv: EdgeConv
     torch.testing.assert_close(conv(features, itself), before)
 
 
-def test_widths() -> None:
+def test_channels_of_all_layers() -> None:
     network = DGCNN().eval()
     outputs = edge_features(network, clouds())
     assert [o.shape[-1] for o in outputs] == [64, 64, 128, 256]
@@ -121,7 +121,7 @@ def test_edge_convolutions_keep_full_precision_under_autocast() -> None:
         assert torch.equal(edge_features(network, clouds())[-1], exact)
 
 
-def test_neighbours_by_number_of_points_are_the_authors() -> None:
+def test_number_of_neighbours_is_the_authors() -> None:
     assert [DGCNN().num_neighbours(count) for count in (128, 1024, 2048, 4096)] == [20, 20, 40, 40]
     assert DGCNN(k=7).num_neighbours(4096) == 7
     _, neighbours = DGCNN().neighbourhoods(clouds(num_points=2048))

@@ -47,24 +47,24 @@ def headed(name: str) -> PointNetwork:
 def test_every_network_takes_every_head(name: str) -> None:
     network = headed(name).eval()
     with torch.inference_mode():
-        found = head_outputs(network, clouds())
+        outputs = head_outputs(network, clouds())
         logits = network(clouds())
-    assert {key: tuple(value.shape) for key, value in found.items() if key in HEADS} == {
+    assert {key: tuple(value.shape) for key, value in outputs.items() if key in HEADS} == {
         "door": (3, 1),
         "angle": (3, 1),
         "hinge": (3, 1),
         "frame": (3, 3),
         "widths": (3, 2),
     }
-    assert torch.equal(found["state"], logits)
+    assert torch.equal(outputs["state"], logits)
     assert logits.shape == (3, 3)
-    assert all(value.isfinite().all() and value.dtype == torch.float32 for value in found.values())
+    assert all(value.isfinite().all() and value.dtype == torch.float32 for value in outputs.values())
     if name in WITH_PARTS:
-        assert found["parts"].shape == (3, 160, 6)
+        assert outputs["parts"].shape == (3, 160, 6)
 
 
 @pytest.mark.parametrize("name", list_networks())
-def test_training_lowers_the_losses_and_reaches_every_parameter(name: str) -> None:
+def test_training_lowers_the_losses_and_every_parameter_has_a_gradient(name: str) -> None:
     network = headed(name).train()
     optimizer = torch.optim.Adam(network.parameters(), 3e-4)
     totals = []
@@ -93,16 +93,16 @@ def test_without_heads_the_parameters_are_those_of_the_paper(name: str) -> None:
 
 @pytest.mark.parametrize("name", WITH_PARTS)
 def test_parts_follow_their_points(name: str) -> None:
-    """Points after the centres in another order: each keeps its part."""
+    """A permutation of the points after the centres permutes their parts."""
     network = headed(name).double().eval()
     points = clouds(700).double()
     order = torch.cat(
         [torch.arange(512), 512 + torch.randperm(188, generator=torch.Generator().manual_seed(3))]
     )
     with torch.inference_mode():
-        found, moved = (head_outputs(network, cloud)["parts"] for cloud in (points, points[:, order]))
-    torch.testing.assert_close(moved, found[:, order], atol=1e-9, rtol=0)
-    assert found.std(dim=1).min() > 1e-6
+        parts, moved_parts = (head_outputs(network, cloud)["parts"] for cloud in (points, points[:, order]))
+    torch.testing.assert_close(moved_parts, parts[:, order], atol=1e-9, rtol=0)
+    assert parts.std(dim=1).min() > 1e-6
 
 
 @pytest.mark.parametrize("name", WITH_PARTS)
@@ -111,30 +111,30 @@ def test_parts_of_the_first_points_are_those_of_all(name: str, count: int) -> No
     network = headed(name).double().eval()
     points = clouds(700).double()
     parts = torch.randint(-1, 6, (3, 700), generator=torch.Generator().manual_seed(5))
-    wanted = {key: value.double() for key, value in targets().items()} | {"parts": parts}
+    all_targets = {key: value.double() for key, value in targets().items()} | {"parts": parts}
     with torch.inference_mode():
         every = head_outputs(network, points)["parts"]
         encoding = network.encode(points)
-        some = network.heads["parts"](points[:, :count], encoding)
-        losses, _ = joint_losses(network, points, LABELS, wanted, part_points=count)
-    torch.testing.assert_close(some, every[:, :count], atol=1e-9, rtol=0)
-    known = parts[:, :count] >= 0
-    expected = torch.nn.functional.cross_entropy(every[:, :count][known], parts[:, :count][known])
+        first = network.heads["parts"](points[:, :count], encoding)
+        losses, _ = joint_losses(network, points, LABELS, all_targets, part_points=count)
+    torch.testing.assert_close(first, every[:, :count], atol=1e-9, rtol=0)
+    has_part = parts[:, :count] >= 0
+    expected = torch.nn.functional.cross_entropy(every[:, :count][has_part], parts[:, :count][has_part])
     torch.testing.assert_close(losses["parts"], expected)
 
 
-def test_unknown_targets_cost_nothing() -> None:
+def test_missing_targets_have_no_loss() -> None:
     network = headed("pointnet2").train()
-    unknown = {key: torch.full_like(value, math.nan) for key, value in targets().items() if key in HEADS}
-    unknown["parts"] = torch.full((3, 160), -1)
-    losses, _ = joint_losses(network, clouds(), torch.full((3,), -100), unknown)
+    missing = {key: torch.full_like(value, math.nan) for key, value in targets().items() if key in HEADS}
+    missing["parts"] = torch.full((3, 160), -1)
+    losses, _ = joint_losses(network, clouds(), torch.full((3,), -100), missing)
     assert float(losses["state"].detach()) == 0
-    assert all(float(losses[key].detach()) == 0 for key in unknown)
+    assert all(float(losses[key].detach()) == 0 for key in missing)
     sum(losses.values(), torch.zeros(())).backward()  # type: ignore[no-untyped-call]
     assert not any(p.grad is not None and p.grad.any() for p in network.heads.parameters())
 
 
-def test_one_unknown_cloud_leaves_the_mean_of_the_others() -> None:
+def test_loss_is_the_mean_over_clouds_with_a_target() -> None:
     network = headed("pointnet").eval()
     with torch.inference_mode():
         losses, _ = joint_losses(network, clouds(), LABELS, targets())
@@ -149,7 +149,7 @@ def test_one_unknown_cloud_leaves_the_mean_of_the_others() -> None:
             torch.testing.assert_close(losses[key], with_target.mean())
 
 
-def test_errors_name_what_is_known() -> None:
+def test_unknown_heads_are_refused() -> None:
     network = create_network("point2sequence")
     with pytest.raises(ConfigError, match="unknown head 'angel'; did you mean 'angle'"):
         add_heads(network, ["angel"])

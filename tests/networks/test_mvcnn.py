@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The multi-view CNN: its pictures by hand and by a plain loop, and what every network promises."""
+"""The multi-view CNN: its images by hand and by a plain loop, and the contract of all networks."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def clouds(points: int, batch: int = 2) -> torch.Tensor:
     return torch.rand(batch, points, 3, generator=torch.Generator().manual_seed(1)) * 2 - 1
 
 
-def test_it_stands_beside_the_five_of_the_paper() -> None:
+def test_it_is_created_by_name_but_not_listed() -> None:
     network = create_network("mvcnn")
     assert isinstance(network, MVCNN)
     assert "mvcnn" not in list_networks()
@@ -25,7 +25,7 @@ def test_it_stands_beside_the_five_of_the_paper() -> None:
 
 def test_one_point_ahead_is_one_pixel_of_the_front_view() -> None:
     network = MVCNN()
-    cloud = torch.full((1, 128, 3), 9.0)  # out of every picture
+    cloud = torch.full((1, 128, 3), 9.0)  # outside every image
     cloud[0, 0] = torch.tensor([-0.5, 0.25, 0.5])  # near, to the left, above
     filled, near = network.render(cloud)[0, 0]
     column = math.floor((1 - 0.25 / HALF_WIDTH) / 2 * PIXELS)
@@ -34,9 +34,9 @@ def test_one_point_ahead_is_one_pixel_of_the_front_view() -> None:
     assert near[row, column] == pytest.approx((HALF_WIDTH + 0.5) / (2 * HALF_WIDTH))
 
 
-def test_pictures_are_those_of_a_plain_loop() -> None:
+def test_images_equal_those_of_a_plain_loop() -> None:
     network, cloud = MVCNN(pixels=16), clouds(200, 1)
-    pictures = network.render(cloud)[0]
+    images = network.render(cloud)[0]
     for view, (azimuth_deg, elevation_deg) in enumerate(VIEWS_DEG):
         a, e = math.radians(azimuth_deg), math.radians(elevation_deg)
         expected = torch.zeros(2, 16, 16)
@@ -51,10 +51,10 @@ def test_pictures_are_those_of_a_plain_loop() -> None:
                 nearness = min(1.0, max(0.0, (HALF_WIDTH - depth) / (2 * HALF_WIDTH)))
                 expected[1, row, column] = max(float(expected[1, row, column]), nearness)
         # A point on the border of two pixels may fall to either side.
-        assert ((pictures[view] - expected).abs() < 1e-5).float().mean() > 0.99
+        assert ((images[view] - expected).abs() < 1e-5).float().mean() > 0.99
 
 
-def test_the_order_of_points_and_the_other_clouds_do_not_matter() -> None:
+def test_order_of_points_and_other_clouds_do_not_matter() -> None:
     network = MVCNN().eval()
     cloud = clouds(300)
     shuffled = cloud[:, torch.randperm(300, generator=torch.Generator().manual_seed(2))]

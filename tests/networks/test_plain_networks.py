@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every whole network against its plain form: logits, and all that one training step changes."""
+"""Every network against its plain form: logits, and everything that a training step changes."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def plain_step(case: str) -> tuple[Step, PointNetwork]:
 
 
 def assert_same_gradients(fast: Step, plain: Step, tolerance: float) -> None:
-    """Each to a share of its norm, or of a hundredth of the norm of all: some gradients are zero but noise."""
+    """Compare to a share of the norm, or of a hundredth of the norm of all: some gradients are zero but for noise."""
     unused = [name for name, gradient in plain.gradients.items() if gradient is None]
     assert [name for name, gradient in fast.gradients.items() if gradient is None] == unused
     norms = {name: g.norm().item() for name, g in plain.gradients.items() if g is not None}

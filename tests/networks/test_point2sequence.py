@@ -83,15 +83,15 @@ def test_attention_written_out() -> None:
 
 def test_areas_are_nested_and_ordered(network: Point2Sequence) -> None:
     points = clouds(1, 500)
-    found = network.neighbourhoods(points)[0]
-    assert found.shape == (1, 384, 128)
-    assert torch.equal(found, knn(points[:, :384], points, 128))
+    neighbours = network.neighbourhoods(points)[0]
+    assert neighbours.shape == (1, 384, 128)
+    assert torch.equal(neighbours, knn(points[:, :384], points, 128))
     assert list(AREAS) == [16, 32, 64, 128]
     with torch.no_grad():
         sequence = network.sequence(points, *network.neighbourhoods(points))
         assert sequence.shape == (1, 384, 4, 128)
         for t, (size, mlp) in enumerate(zip(AREAS, network.mlps, strict=True)):
-            offsets = points[0, found[0, 5, :size]] - points[0, 5]  # one region by hand
+            offsets = points[0, neighbours[0, 5, :size]] - points[0, 5]  # one region by hand
             torch.testing.assert_close(sequence[0, 5, t], mlp(offsets[None])[0])
 
 
@@ -102,10 +102,10 @@ def test_sequence_is_read_from_small_to_large(network: Point2Sequence) -> None:
     assert query.shape == (1, 3, 128)
     changed = sequence.clone()
     changed[:, :, 3] += 1
-    later, other = network.encode_decode(changed)
-    assert torch.equal(later[:, :, :3], memory[:, :, :3])
-    assert not torch.equal(later[:, :, 3], memory[:, :, 3])
-    assert not torch.equal(other, query)
+    changed_memory, changed_query = network.encode_decode(changed)
+    assert torch.equal(changed_memory[:, :, :3], memory[:, :, :3])
+    assert not torch.equal(changed_memory[:, :, 3], memory[:, :, 3])
+    assert not torch.equal(changed_query, query)
 
 
 @pytest.mark.parametrize("region_feature", ["attention", "released"])

@@ -56,13 +56,13 @@ def test_shapes_of_neighbours_matrices_and_features() -> None:
 
 def test_matrices_are_predicted_from_exact_coordinates_under_autocast() -> None:
     transform = PointCNN().levels[0].transform
-    seen: list[Tensor] = []
-    transform.norm0.register_forward_pre_hook(lambda module, args: seen.append(args[0]))
+    inputs: list[Tensor] = []
+    transform.norm0.register_forward_pre_hook(lambda module, args: inputs.append(args[0]))
     offsets = torch.randn(1, 20, 8, 3)
     transform(offsets)
     with torch.autocast("cpu", dtype=torch.bfloat16):
         transform(offsets)
-    assert torch.equal(seen[0], seen[1])
+    assert torch.equal(inputs[0], inputs[1])
 
 
 def test_lift_widths_and_multipliers() -> None:
@@ -79,9 +79,9 @@ def test_lift_widths_and_multipliers() -> None:
 def test_dilated_neighbours_are_every_dth_of_the_nearest() -> None:
     points = clouds()
     level = XConv(Level(k=16, dilation=3, num_representatives=40, channels=32), 8)
-    found = level.neighbours(points)
-    assert torch.equal(found, knn(points[:, :40], points, 48)[..., ::3])
-    assert (found[..., 0] == torch.arange(40)).all()
+    neighbours = level.neighbours(points)
+    assert torch.equal(neighbours, knn(points[:, :40], points, 48)[..., ::3])
+    assert (neighbours[..., 0] == torch.arange(40)).all()
 
 
 def test_dilation_shrinks_when_points_are_few() -> None:
@@ -111,8 +111,10 @@ def test_loss_is_the_mean_over_representative_points() -> None:
     loss, logits = network.training_loss(clouds(), labels, label_smoothing=0.1)
     point_logits = network.head(network.point_features(clouds()))
     assert point_logits.shape == (2, 128, 3)
-    each = [nn.functional.cross_entropy(point_logits[:, p], labels, label_smoothing=0.1) for p in range(128)]
-    torch.testing.assert_close(loss, torch.stack(each).mean())
+    losses = [
+        nn.functional.cross_entropy(point_logits[:, p], labels, label_smoothing=0.1) for p in range(128)
+    ]
+    torch.testing.assert_close(loss, torch.stack(losses).mean())
     torch.testing.assert_close(logits, network(clouds()))
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""PointNet: transforms that start as identities, the regulariser, indifference to order."""
+"""PointNet: transforms that start as identities, the regulariser, invariance to order."""
 
 from __future__ import annotations
 
@@ -40,13 +40,13 @@ def test_points_are_row_vectors_to_the_transforms() -> None:
 
 def test_feature_transform_acts_on_row_vectors() -> None:
     network = PointNet().eval()
-    seen: list[Tensor] = []
-    network.encoder.register_forward_pre_hook(lambda module, args: seen.append(args[0]))
+    inputs: list[Tensor] = []
+    network.encoder.register_forward_pre_hook(lambda module, args: inputs.append(args[0]))
     swap_cycle = torch.eye(64).roll(1, dims=1)  # moves channel i to i + 1
     with torch.no_grad():
         network.feature_transform.output.bias.copy_((swap_cycle - torch.eye(64)).flatten())
         network(clouds())
-        torch.testing.assert_close(seen[0], network.local(clouds()).roll(1, dims=-1))
+        torch.testing.assert_close(inputs[0], network.local(clouds()).roll(1, dims=-1))
 
 
 def test_penalty_by_hand() -> None:
@@ -76,8 +76,8 @@ def test_order_of_points_does_not_matter() -> None:
 
 def test_coordinates_are_aligned_in_full_precision_under_autocast() -> None:
     network = PointNet().eval()
-    seen: list[Tensor] = []
-    network.local.register_forward_pre_hook(lambda module, args: seen.append(args[0]))
+    inputs: list[Tensor] = []
+    network.local.register_forward_pre_hook(lambda module, args: inputs.append(args[0]))
     with torch.autocast("cpu", dtype=torch.bfloat16):
         network(clouds())
-    assert torch.equal(seen[0], clouds())
+    assert torch.equal(inputs[0], clouds())

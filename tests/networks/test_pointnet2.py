@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""PointNet++: set abstraction against its plain twin, both variants, what moves and what does not."""
+"""PointNet++: set abstraction against its plain twin, both variants, invariances."""
 
 from __future__ import annotations
 
@@ -126,10 +126,10 @@ def test_an_unknown_variant_is_refused() -> None:
 def test_interpolation_equals_scipy() -> None:
     points, centres = torch.rand(3, 300, 3, dtype=torch.float64), torch.rand(3, 40, 3, dtype=torch.float64)
     features = torch.rand(3, 40, 5, dtype=torch.float64)
-    found = interpolate(features, centres, points)
+    interpolated = interpolate(features, centres, points)
     for cloud in range(3):
         distance, index = cKDTree(centres[cloud].numpy()).query(points[cloud].numpy(), 3)
         weight = 1 / (np.square(distance) + 1e-8)
         weight /= weight.sum(axis=1, keepdims=True)
         expected = (features[cloud].numpy()[index] * weight[..., None]).sum(axis=1)
-        np.testing.assert_allclose(found[cloud].numpy(), expected, atol=1e-9)
+        np.testing.assert_allclose(interpolated[cloud].numpy(), expected, atol=1e-9)

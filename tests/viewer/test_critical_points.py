@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Critical points are those that the features hang on, and no others."""
+"""Critical points are exactly the points that the features depend on."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def features(network: PointNetwork, points: torch.Tensor) -> torch.Tensor:
         return network.features(points[None])[0]
 
 
-def test_of_pointnet_they_are_the_rows_with_the_maximum(cloud: Points) -> None:
+def test_critical_points_of_pointnet_are_the_rows_with_the_maximum(cloud: Points) -> None:
     network = network_of("pointnet")
     points = torch.from_numpy(normalize(cloud))
     alone = torch.stack(
@@ -56,7 +56,7 @@ def test_of_pointnet_they_are_the_rows_with_the_maximum(cloud: Points) -> None:
     assert counts_of(network, cloud).tolist() == torch.bincount(winners, minlength=COUNT).tolist()
 
 
-def test_pointnet_sees_no_more_than_its_critical_points(cloud: Points) -> None:
+def test_features_of_pointnet_depend_on_critical_points_only(cloud: Points) -> None:
     network = network_of("pointnet")
     critical = counts_of(network, cloud) > 0
     assert 20 < critical.sum() < COUNT / 2
@@ -85,23 +85,23 @@ def test_only_critical_points_and_centres_move_the_features(
     network = network_of(name, **options)
     network.use_centres(share)
     points = torch.from_numpy(normalize(cloud))[None].requires_grad_()
-    found = network.features(points)
-    weights = torch.from_numpy(np.random.default_rng(1).uniform(1, 2, found.shape).astype(np.float32))
-    (gradient,) = torch.autograd.grad((found * weights).sum(), points)
+    outputs = network.features(points)
+    weights = torch.from_numpy(np.random.default_rng(1).uniform(1, 2, outputs.shape).astype(np.float32))
+    (gradient,) = torch.autograd.grad((outputs * weights).sum(), points)
     moves = (gradient[0] != 0).any(dim=1).numpy()
     counts = counts_of(network, cloud)
-    assert 0 < (counts[centres:] == 0).sum() < COUNT - centres, "a test that tells nothing"
+    assert 0 < (counts[centres:] == 0).sum() < COUNT - centres, "the test would be trivial"
     assert moves[centres:].tolist() == (counts[centres:] > 0).tolist()
-    # Every channel above zero comes from somewhere, and from one place only.
-    assert counts.sum() == pytest.approx(float((found > 0).sum()), rel=1e-5)
+    # Every channel above zero is counted once.
+    assert counts.sum() == pytest.approx(float((outputs > 0).sum()), rel=1e-5)
 
 
-def test_of_dgcnn_they_are_the_rows_with_the_maximum(cloud: Points) -> None:
+def test_critical_points_of_dgcnn_are_the_rows_with_the_maximum(cloud: Points) -> None:
     network = network_of("dgcnn")
     counts = counts_of(network, cloud)
     assert counts.sum() == 1024
     assert counts.tolist() == counts.round().tolist()
-    # Any other order of the points gives each the same channels.
+    # The counts follow a permutation of the points.
     order = np.random.default_rng(2).permutation(COUNT)
     assert counts_of(network, cloud[order]).tolist() == counts[order].tolist()
 
@@ -111,12 +111,12 @@ def test_networks_without_a_maximum_over_points_have_none(name: str, cloud: Poin
     assert critical_points(network_of(name), cloud) is None
 
 
-def test_every_other_network_has_some(cloud: Points) -> None:
+def test_all_other_networks_have_critical_points(cloud: Points) -> None:
     for name in set(list_networks()) - {"pointcnn", "mvcnn"}:
         assert counts_of(network_of(name), cloud).sum() > 100
 
 
-def test_nothing_is_left_in_the_network(cloud: Points) -> None:
+def test_hooks_are_removed_from_the_network(cloud: Points) -> None:
     network = network_of("pointnet2")
     first = counts_of(network, cloud)
     assert not any(module._forward_pre_hooks for module in network.modules())

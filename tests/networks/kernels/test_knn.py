@@ -15,10 +15,10 @@ from tests.networks.twins import random_rows
 
 def test_knn_agrees_with_scikit_learn() -> None:
     points = random_rows(2, 150, 3)
-    found = knn(points[:, :40], points, 9)
+    neighbours = knn(points[:, :40], points, 9)
     for b in range(2):
         tree = NearestNeighbors(n_neighbors=9).fit(points[b].numpy())
-        assert (found[b].numpy() == tree.kneighbors(points[b, :40].numpy(), return_distance=False)).all()
+        assert (neighbours[b].numpy() == tree.kneighbors(points[b, :40].numpy(), return_distance=False)).all()
 
 
 @pytest.mark.parametrize("dimensions", [3, 8])
@@ -30,19 +30,19 @@ def test_knn_equals_its_plain_twin(dimensions: int) -> None:
 def test_knn_of_more_queries_than_one_block() -> None:
     points = random_rows(1, 1500, 3)
     squared = (points.unsqueeze(2) - points.unsqueeze(1)).square().sum(-1)
-    found = knn(points, points, 4)
+    neighbours = knn(points, points, 4)
     torch.testing.assert_close(
-        squared.gather(2, found), squared.topk(4, largest=False).values, rtol=0, atol=1e-7
+        squared.gather(2, neighbours), squared.topk(4, largest=False).values, rtol=0, atol=1e-7
     )
-    assert (found[0, :, 0] == torch.arange(1500)).all()
+    assert (neighbours[0, :, 0] == torch.arange(1500)).all()
 
 
 @pytest.mark.parametrize("dimensions", [3, 16])
 def test_a_query_comes_first_whatever_duplicates_it_has(dimensions: int) -> None:
     points = random_rows(2, 6, dimensions).repeat(1, 5, 1)  # every point five times
-    found = knn(points, points, 5)
-    assert (found[..., 0] == torch.arange(30)).all()
-    assert (found % 6 == (torch.arange(30) % 6).view(1, -1, 1)).all()
+    neighbours = knn(points, points, 5)
+    assert (neighbours[..., 0] == torch.arange(30)).all()
+    assert (neighbours % 6 == (torch.arange(30) % 6).view(1, -1, 1)).all()
 
 
 def test_a_foreign_query_is_not_taken_for_the_point_of_its_index() -> None:
@@ -74,8 +74,8 @@ def test_neighbours_do_not_depend_on_autocast() -> None:
 def test_knn_of_more_queries_than_points() -> None:
     points = random_rows(3, 90, 3, seed=1)
     query = torch.cat([points, random_rows(3, 400, 3, seed=2)], dim=1)
-    found = knn(query, points, 4)
-    for each in range(3):
-        neighbours = NearestNeighbors(n_neighbors=4).fit(points[each].numpy())
-        expected = neighbours.kneighbors(query[each].numpy(), return_distance=False)
-        assert found[each].tolist() == expected.tolist()
+    neighbours = knn(query, points, 4)
+    for b in range(3):
+        tree = NearestNeighbors(n_neighbors=4).fit(points[b].numpy())
+        expected = tree.kneighbors(query[b].numpy(), return_distance=False)
+        assert neighbours[b].tolist() == expected.tolist()

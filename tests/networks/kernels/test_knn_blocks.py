@@ -26,12 +26,12 @@ def by_distance_and_index(points: torch.Tensor, k: int) -> torch.Tensor:
 def test_neighbours_in_blocks_are_those_of_all_distances(dimensions: int, k: int, in_order: bool) -> None:
     points = (random_rows(2, 1024, dimensions) * 8).round() / 8
     points -= points.mean(1, keepdim=True).mul(2**16).round() / 2**16
-    found = knn(points, points, k, in_order=in_order)
+    neighbours = knn(points, points, k, in_order=in_order)
     expected = by_distance_and_index(points, k)
     squared = (points.double().unsqueeze(2) - points.double().unsqueeze(1)).square().sum(-1)
-    torch.testing.assert_close(squared.gather(2, found), squared.gather(2, expected), rtol=0, atol=1e-4)
-    assert (found[..., 0] == torch.arange(1024)).all()
-    assert all(len(set(row.tolist())) == k for row in found.flatten(0, 1)[::37])
+    torch.testing.assert_close(squared.gather(2, neighbours), squared.gather(2, expected), rtol=0, atol=1e-4)
+    assert (neighbours[..., 0] == torch.arange(1024)).all()
+    assert all(len(set(row.tolist())) == k for row in neighbours.flatten(0, 1)[::37])
 
 
 @settings(deadline=None, max_examples=20)
@@ -40,17 +40,17 @@ def test_neighbours_in_blocks_of_surfaces(seed: int, count: int, size: float, sh
     points = random_rows(1, count, 3, seed=seed)
     points[..., 0] = (points[..., 1] * 2).sin()  # thin, as clouds of rooms are
     points = points * size + shift
-    found = knn(points, points, 16)
+    neighbours = knn(points, points, 16)
     squared = (points.double().unsqueeze(2) - points.double().unsqueeze(1)).square().sum(-1)
     expected = squared.topk(16, largest=False).values
     rounding = 4e-6 * (size + abs(shift)) * size  # of float32 coordinates
-    torch.testing.assert_close(squared.gather(2, found), expected, rtol=1e-5, atol=rounding)
+    torch.testing.assert_close(squared.gather(2, neighbours), expected, rtol=1e-5, atol=rounding)
 
 
 def test_duplicates_in_blocks_come_by_index_after_the_query_itself() -> None:
     points = random_rows(1, 256, 3).repeat(1, 4, 1)  # every point four times
-    found = knn(points, points, 4)
+    neighbours = knn(points, points, 4)
     own = torch.arange(1024).view(-1, 1)
     others = torch.stack([torch.arange(256) + 256 * i for i in range(4)], 1).repeat(4, 1)
     others = others[others != own].view(1024, 3)
-    assert torch.equal(found[0], torch.cat([own, others], dim=1))
+    assert torch.equal(neighbours[0], torch.cat([own, others], dim=1))

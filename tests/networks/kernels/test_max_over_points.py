@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Maxima over points and their gradients: ties, NaN-free zeros of both signs."""
+"""Maxima over points and their gradients: ties, zeros of both signs."""
 
 from __future__ import annotations
 

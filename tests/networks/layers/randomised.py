@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Layers that are not as untrained."""
+"""Layers whose scales and statistics are not those of an untrained layer."""
 
 from __future__ import annotations
 

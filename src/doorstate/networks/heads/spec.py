@@ -65,7 +65,7 @@ def _invariant(target: Values, draw: AugmentationDraw) -> Values:
 class HeadSpec:
     """Head that predicts one small vector per cloud.
 
-    Attributes:
+    Args:
         name: in configurations, weights cards and exported files.
         description: of the values, for users of an exported file.
         columns: of the table of outputs, one for each value.
@@ -112,7 +112,7 @@ class HeadSpec:
 class PointHeadSpec:
     """Head that classifies every point; its layers belong to the network (`PointNetwork.part_branch`).
 
-    Attributes:
+    Args:
         name: as of `HeadSpec`.
         classes: names of the classes.
         target: (M, n) stored classes to (M, n) int64 targets, negative where unknown.
