@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which rule suits your doors? Each is asked about labelled clouds, whole and with the left half of the image lost.
+"""Compare all rules on your labelled clouds, whole and with the left half of the image missing.
 
     doorstate simulate --poses 20 --keep pcd --out doors
     python examples/choose_rule.py doors/pcd
 
-The folder has one folder for each state (open, semi-open, closed, in any usual spelling). The last two columns count
-doors that are not open and are called open when data are missing: with the gate, and without. No torch is needed.
+The folder has one sub-folder for each state (open, semi-open, closed, in any usual spelling). The last two columns
+count doors that are not open and are called open when data are missing: with the gate, and without it. Needs no torch.
 """
 
 from __future__ import annotations
@@ -17,10 +17,9 @@ from statistics import median
 
 import numpy as np
 
-from doorstate import read_cloud
+from doorstate import Predictor, read_cloud
 from doorstate.dataset.class_folders import labelled_rows
-from doorstate.inference.rule_predictor import RulePredictor
-from doorstate.rules import create_rule, list_rules
+from doorstate.rules import list_rules
 from doorstate.types import DoorState
 
 
@@ -30,25 +29,27 @@ def main(root: Path) -> None:
         (read_cloud(root / row["file"]), DoorState[row["state"].upper()]) for row in labelled_rows(root)
     ]
     print(f"{len(labelled)} clouds")
-    print(
-        f"{'rule':16}{'right':>6}{'wrong':>6}{'no answer':>11}{'ms':>6}   called open by mistake: gate, no gate"
-    )
+    print(f"{'rule':16}{'right':>6}{'wrong':>6}{'unknown':>9}{'ms':>6}  open by mistake: gate, no gate")
     for name in list_rules():
-        gated, careless = RulePredictor.from_name(name), RulePredictor(create_rule(name), gate=None)
-        verdicts: Counter[str] = Counter()
+        gated, ungated = Predictor.load(rule=name), Predictor.load(rule=name, gate=None)
+        counts: Counter[str] = Counter()
         milliseconds = []
-        by_mistake = [0, 0]
         for cloud, state in labelled:
             prediction = gated(cloud)
             milliseconds.append(prediction.milliseconds)
-            verdicts["none" if prediction.state is None else str(prediction.state == state)] += 1
+            if prediction.state is None:
+                counts["unknown"] += 1
+            else:
+                counts["right" if prediction.state == state else "wrong"] += 1
             if cloud.ndim == 3 and state != DoorState.OPEN:
                 half = cloud.copy()
                 half[:, : half.shape[1] // 2] = np.nan
-                for place, predictor in enumerate((gated, careless)):
-                    by_mistake[place] += predictor(half).state == DoorState.OPEN
-        counts = f"{verdicts['True']:6}{verdicts['False']:6}{verdicts['none']:11}{median(milliseconds):6.0f}"
-        print(f"{name:16}{counts}{by_mistake[0]:29}{by_mistake[1]:9}")
+                counts["open with gate"] += gated(half).state == DoorState.OPEN
+                counts["open without gate"] += ungated(half).state == DoorState.OPEN
+        row = (
+            f"{name:16}{counts['right']:6}{counts['wrong']:6}{counts['unknown']:9}{median(milliseconds):6.0f}"
+        )
+        print(f"{row}{counts['open with gate']:23}{counts['open without gate']:9}")
 
 
 if __name__ == "__main__":

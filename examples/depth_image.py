@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From a depth image and the camera's intrinsics to a state, as arrays: what the driver of a camera hands over.
+"""Predict from a depth image and the intrinsics of the camera, as arrays of a camera driver.
 
     python examples/depth_image.py depth.png camera_info.yaml
 
-Keep the image an image: of (H, W, 3) points a network looks at some rows and columns only, which is quicker, and the
-gate finds holes in it. No torch is needed, as a rule answers.
+Keep the cloud organized, (H, W, 3): the gate finds holes in it, and a network samples it faster. Needs no torch,
+because it uses a rule.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from doorstate.io.camera import read_intrinsics
 from doorstate.io.depth import depth_to_points
 
 
-def main(picture: Path, camera: Path) -> None:
-    """Print how much was measured, and the state."""
-    stored = np.asarray(Image.open(picture))  # (H, W) uint16 millimetres, 0 where nothing returned
+def main(image: Path, camera: Path) -> None:
+    """Print the measured share of the pixels, and the state."""
+    depth_mm = np.asarray(Image.open(image))  # (H, W) uint16, 0 where nothing was measured
     intrinsics = read_intrinsics(camera)  # or Intrinsics(width, height, fx, fy, cx, cy)
-    cloud = depth_to_points(stored * 0.001, intrinsics, roll_deg=0)  # 90 if the camera lies on its right side
+    cloud = depth_to_points(depth_mm * 0.001, intrinsics, roll_deg=0)  # 90: camera lies on its right side
     print(f"measured: {np.isfinite(cloud[..., 0]).mean():.0%} of the pixels")
 
     prediction = Predictor.load(rule="wall_leaf_angle")(cloud)

@@ -3,8 +3,8 @@
 
     python examples/make_bag.py door-bag
 
-The simulator's camera stands before a closed door, which begins to open after three seconds. The bag holds what the
-driver of a depth camera publishes: depth images in millimetres, and the camera beside them. Needs the extra `bags`.
+The simulated camera stands before a closed door, which begins to open after three seconds. The bag has the messages of
+a depth camera driver: depth images in millimetres, and camera_info. Needs the extra `bags`.
 """
 
 from __future__ import annotations
@@ -23,26 +23,26 @@ from doorstate.simulation.render import cut_range, render
 from doorstate.simulation.scene import Door, Opening, Scene, scene_boxes
 
 CAMERA = DepthCamera(width=320, height=240)
-STANDS_AT = CameraPose(x_m=-0.3, y_m=2.4, z_m=1.0, yaw_rad=math.radians(-83))  # the wall is at y = 0
+CAMERA_POSE = CameraPose(x_m=-0.3, y_m=2.4, z_m=1.0, yaw_rad=math.radians(-83))  # the wall is at y = 0
 SECONDS, FRAMES_PER_S = 8, 5
 START_NS = 1_700_000_000_000_000_000
 STORE = get_typestore(Stores.LATEST)
 
 
 def opening_angle_deg(time_s: float) -> float:
-    """Closed for three seconds, then 45 degrees a second, up to 90."""
+    """Return 0 for three seconds, then 45 degrees a second, up to 90."""
     return min(90.0, max(0.0, 45.0 * (time_s - 3)))
 
 
-def see(angle_deg: float) -> np.ndarray:
-    """(H, W) 16-bit millimetres, 0 where nothing was measured."""
+def depth_millimetres(angle_deg: float) -> np.ndarray:
+    """Return a (H, W) uint16 depth image of the door, 0 where nothing was measured."""
     scene = scene_boxes(Scene(door=Door(), has_ceiling=False), Opening(angle_deg=angle_deg))
-    depth_m = cut_range(render(scene, STANDS_AT, CAMERA.intrinsics()), CAMERA).depth_m
+    depth_m = cut_range(render(scene, CAMERA_POSE, CAMERA.intrinsics()), CAMERA).depth_m
     return np.nan_to_num(depth_m * 1000).round().astype("<u2")
 
 
 def message(name: str, stamp_ns: int, **fields: Any) -> Any:
-    """A message of sensor_msgs."""
+    """Return a message of sensor_msgs."""
     stamp = STORE.types["builtin_interfaces/msg/Time"](sec=stamp_ns // 10**9, nanosec=stamp_ns % 10**9)
     header = STORE.types["std_msgs/msg/Header"](stamp=stamp, frame_id="camera_depth_optical_frame")
     size = {"height": CAMERA.height, "width": CAMERA.width}
@@ -50,7 +50,7 @@ def message(name: str, stamp_ns: int, **fields: Any) -> Any:
 
 
 def depth_image(stamp_ns: int, millimetres: np.ndarray) -> Any:
-    """Image of 16-bit depth."""
+    """Return an Image message of 16-bit depth."""
     data = millimetres.view(np.uint8).ravel()
     return message(
         "Image", stamp_ns, encoding="16UC1", is_bigendian=0, step=2 * millimetres.shape[1], data=data
@@ -58,7 +58,7 @@ def depth_image(stamp_ns: int, millimetres: np.ndarray) -> Any:
 
 
 def camera_info(stamp_ns: int) -> Any:
-    """The camera of the images, as a matrix K, and P without distortion."""
+    """Return the CameraInfo of the images, without distortion."""
     lens = CAMERA.intrinsics()
     k = np.array([[lens.fx, 0, lens.cx], [0, lens.fy, lens.cy], [0, 0, 1]])
     region = STORE.types["sensor_msgs/msg/RegionOfInterest"](
@@ -79,7 +79,7 @@ def camera_info(stamp_ns: int) -> Any:
 
 
 def main(folder: Path) -> None:
-    """Write the bag, a new folder."""
+    """Write the bag into a new folder."""
     with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as bag:
         image_type, info_type = "sensor_msgs/msg/Image", "sensor_msgs/msg/CameraInfo"
         images = bag.add_connection("/camera/depth/image_rect_raw", image_type, typestore=STORE)
@@ -87,9 +87,9 @@ def main(folder: Path) -> None:
         for number in range(SECONDS * FRAMES_PER_S):
             time_s = number / FRAMES_PER_S
             stamp_ns = START_NS + round(time_s * 1e9)
-            seen = depth_image(stamp_ns, see(opening_angle_deg(time_s)))
+            image = depth_image(stamp_ns, depth_millimetres(opening_angle_deg(time_s)))
             bag.write(infos, stamp_ns, STORE.serialize_cdr(camera_info(stamp_ns), info_type))
-            bag.write(images, stamp_ns, STORE.serialize_cdr(seen, image_type))
+            bag.write(images, stamp_ns, STORE.serialize_cdr(image, image_type))
     print(f"{folder}: {SECONDS * FRAMES_PER_S} depth images in {SECONDS} s")
 
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Ask for the door in one cloud, and deal with every kind of answer.
+"""Predict the state of the door in one cloud, and handle every kind of result.
 
     python examples/one_cloud.py cloud.pcd && echo go
 
-Exit code: 0 the door is open, 1 it is not, 2 nobody can tell. A program that moves something should know all three.
+Exit code: 0 the door is open, 1 it is not, 2 unknown. A program that moves a robot needs all three.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from doorstate.errors import CloudError
 
 
 def main(path: Path) -> int:
-    """Print what is known, and give the exit code."""
-    predictor = Predictor.load()  # once: loading takes longer than answering
+    """Print the result, and return the exit code."""
+    predictor = Predictor.load()  # once: loading takes longer than predicting
     try:
         prediction = predictor(read_cloud(path))
-    except CloudError as error:  # the file cannot be read, or what it holds is no cloud
+    except CloudError as error:  # the file cannot be read, or its content is no cloud
         print(f"unusable: {error}")
         return 2
-    if prediction.state is None:  # too much is missing: the gate says what
+    if prediction.state is None:  # too much is missing, or the network is unsure
         print(f"unknown: {prediction.reason}")
         return 2
     label = prediction.state.label

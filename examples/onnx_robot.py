@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Answer cloud after cloud on a robot without torch, and say which answers came too late.
+"""Predict cloud after cloud without torch, and report late predictions.
 
-    doorstate export pointnet2 --points 512 --out door.onnx     # once, where torch is
+    doorstate export pointnet2 --points 512 --out door.onnx     # once, with torch
     python examples/onnx_robot.py door.onnx recording/          # on the robot
 
-docs/onnx.md says what to install on the robot.
+docs/onnx.md lists the packages that the robot needs.
 """
 
 from __future__ import annotations
@@ -19,17 +19,18 @@ from doorstate.io.find import find_clouds
 BUDGET_MS = 100  # until the next cloud comes
 
 
-def main(network: Path, recording: Path) -> None:
-    """Print the answers, then how long they took."""
-    predictor = Predictor.load(network)
-    predictor.warm_up()  # the first answer would take longer than the others
-    took_ms = []
+def main(weights: Path, recording: Path) -> None:
+    """Print the predictions, then their times."""
+    predictor = Predictor.load(weights)
+    predictor.warm_up()  # otherwise the first prediction is slower
+    milliseconds = []
     for path in find_clouds([recording]):
         prediction = predictor(read_cloud(path))
-        took_ms.append(prediction.milliseconds)
+        milliseconds.append(prediction.milliseconds)
         state = prediction.reason if prediction.state is None else prediction.state.label
         print(f"{path.name}: {state}{' (late)' if prediction.milliseconds > BUDGET_MS else ''}")
-    print(f"{median(took_ms):.0f} ms, at most {max(took_ms):.0f}; torch loaded: {'torch' in sys.modules}")
+    torch_loaded = "torch" in sys.modules
+    print(f"{median(milliseconds):.0f} ms, at most {max(milliseconds):.0f}; torch loaded: {torch_loaded}")
 
 
 if __name__ == "__main__":

@@ -3,8 +3,8 @@
 
     python examples/stream.py door-bag
 
-`StateFilter` and `wait_for` take any stamped clouds: here a recording, on a robot what the driver of the camera gives.
-Exit code 0 if the door came to be open, 1 if not. Needs the extra `bags`.
+`StateFilter` and `wait_for` take any stamped clouds: here those of a recording, on a robot those of a camera driver.
+Exit code 0 if the door was opened, 1 if not. Needs the extra `bags`.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from doorstate.types import Points
 
 
 def stamped_clouds(recording: Path) -> Iterator[tuple[float, Points]]:
-    """Seconds and clouds; put your camera here."""
+    """Yield stamps in seconds and clouds; replace this by your camera."""
     with open_bag(recording) as bag:
         for stamp_s, _, cloud in bag.clouds(bag.choose()):
             if not isinstance(cloud, DoorstateError):
@@ -28,19 +28,19 @@ def stamped_clouds(recording: Path) -> Iterator[tuple[float, Points]]:
 
 
 def main(recording: Path) -> int:
-    """Print what changes, then wait; give the exit code."""
+    """Print every change, then wait; return the exit code."""
     predictor = Predictor.load(rule="plane_state")  # or Predictor.load(budget_ms=33)
     state_filter = StateFilter()
-    first_s = before = None
+    start_s = previous = None
     for stamp_s, cloud in stamped_clouds(recording):
-        first_s = stamp_s if first_s is None else first_s
+        start_s = stamp_s if start_s is None else start_s
         prediction = predictor(cloud)
         door = state_filter.update(prediction, stamp_s)
-        now = (prediction.state, door.state)
-        if now != before:
-            single, filtered = (state.label if state is not None else "unknown" for state in now)
-            print(f"{stamp_s - first_s:4.1f} s  this frame: {single:9}  filtered: {filtered}")
-            before = now
+        states = (prediction.state, door.state)
+        if states != previous:
+            single, filtered = (state.label if state is not None else "unknown" for state in states)
+            print(f"{stamp_s - start_s:4.1f} s  this frame: {single:9}  filtered: {filtered}")
+            previous = states
     if wait_for("open", stamped_clouds(recording), timeout_s=30, hold_s=1.0, predictor=predictor):
         print("the way is free")
         return 0

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Train a network on your own labelled clouds, test it on some that it has not seen, and use it.
+"""Train a network on your labelled clouds, test it on clouds that it was not trained on, and use it.
 
     python examples/train_own.py doors/pcd --out trained
 
-The folder has one folder for each state (open, semi-open, closed, in any usual spelling), at least thirty clouds in
-all and better a thousand. Stopped at any moment, the same command goes on from there. Clouds of most cameras need
-`--frame optical`; for depth images give `ReadOptions` their camera.
+The folder has one sub-folder for each state (open, semi-open, closed, in any usual spelling), with thirty clouds at
+least and better a thousand. If it is stopped, the same command continues. Clouds of most cameras need
+`--frame optical`; for depth images, pass the camera to `ReadOptions`.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from doorstate.types import UNITS_M
 
 
 def main() -> None:
-    """Prepare, train, test, answer."""
+    """Prepare, train, test, predict."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -37,13 +37,13 @@ def main() -> None:
     parser.add_argument("--network", default="pointnet2")
     parser.add_argument("--points", type=int, default=1024)
     parser.add_argument("--epochs", type=int, default=12)
-    asked = parser.parse_args()
-    options = ReadOptions(frame=asked.frame, units_m=UNITS_M[asked.units])
+    arguments = parser.parse_args()
+    options = ReadOptions(frame=arguments.frame, units_m=UNITS_M[arguments.units])
 
     with progress_bar("Preparing") as progress:
         prepared = prepare_dataset(
-            Preparation(asked.clouds, CloudSpec(num_points=asked.points), options=options),
-            asked.out / "prepared",
+            Preparation(arguments.clouds, CloudSpec(num_points=arguments.points), options=options),
+            arguments.out / "prepared",
             progress=progress,
         )
     for row in prepared.rejected:
@@ -52,21 +52,21 @@ def main() -> None:
         None,
         {
             "name": "own",
-            "dataset": str(asked.out / "prepared"),
-            "networks": (asked.network,),
-            "folds": 1,  # of five; 5 tells how much luck is in it
-            "num_points": asked.points,
-            "recipe_changes": {"epochs": asked.epochs},
+            "dataset": str(arguments.out / "prepared"),
+            "networks": (arguments.network,),
+            "folds": 1,  # of five; 5 shows the spread of the scores
+            "num_points": arguments.points,
+            "recipe_changes": {"epochs": arguments.epochs},
         },
     )
-    (metrics,) = compare_with_display(experiment, asked.out / "comparison", jobs=1)
-    print(f"macro-F1 {metrics['test_macro_f1']:.3f} on {metrics['test_samples']} clouds not trained on")
+    (metrics,) = compare_with_display(experiment, arguments.out / "comparison", jobs=1)
+    print(f"macro-F1 {metrics['test_macro_f1']:.3f} on {metrics['test_samples']} test clouds")
 
-    weights = run_of(asked.out / "comparison", asked.network, 0).weights
+    weights = run_of(arguments.out / "comparison", arguments.network, 0).weights
     print(f"weights: {weights}")
-    first = find_clouds([asked.clouds])[0]
+    first = find_clouds([arguments.clouds])[0]
     print(f"{first.name}: {Predictor.load(weights)(read_cloud(first, options)).state!r}")
 
 
-if __name__ == "__main__":  # preparation starts processes, which import this file
+if __name__ == "__main__":  # the preparation starts processes that import this file
     main()
