@@ -117,3 +117,14 @@ def test_packaged_weights_stay_small() -> None:
     }
     assert set(weights) == {"pointnet2", *(f"ogurob-{name}" for name in list_networks())}
     assert sum(weights.values()) <= 25e6
+
+
+def test_a_clone_stays_small() -> None:
+    if not (ROOT / ".git").exists():
+        pytest.skip("no clone of the repository")
+    files = subprocess.check_output(["git", "ls-files", "-z"], cwd=ROOT, text=True).split("\0")
+    sizes = {name: (ROOT / name).stat().st_size for name in files if name and (ROOT / name).is_file()}
+    assert sum(sizes.values()) <= 45e6
+    assert sum(size for name, size in sizes.items() if name.startswith("results/")) <= 12e6
+    reports = [name for name in sizes if name.startswith("results/") and name.endswith((".html", ".png", ".svg"))]
+    assert reports == []
