@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from .paths import EXPERIMENTS
+from . import paths
 
 
 @dataclass(frozen=True)
@@ -44,20 +44,16 @@ class Definition:
         return [Path(folder) for folder in (*tested, *self.content.get("extra_train_datasets", ()))]
 
 
-def read_definition(name: str, folder: Path | None = None) -> Definition:
+def read_definition(name: str) -> Definition:
     """Read the definition of an experiment by name.
-
-    Args:
-        name: of the experiment.
-        folder: with the files; `paper/experiments` if not given.
 
     Raises:
         FileNotFoundError: there is no such file.
     """
-    path = (folder or EXPERIMENTS) / f"{name}.toml"
+    path = paths.EXPERIMENTS / f"{name}.toml"
     return Definition(name, tomllib.loads(path.read_text(encoding="utf-8")))
 
 
 def read_definitions() -> Iterator[Definition]:
     """Read all definitions, by name."""
-    return (read_definition(path.stem) for path in sorted(EXPERIMENTS.glob("*.toml")))
+    return (read_definition(path.stem) for path in sorted(paths.EXPERIMENTS.glob("*.toml")))

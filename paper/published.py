@@ -9,7 +9,7 @@ from doorstate.evaluation.comparison import Results
 from doorstate.evaluation.predictions import join_results, load_results
 from doorstate.evaluation.study import Study, load_study
 
-from .paths import RESULTS
+from . import paths
 
 JOINED = {"related": "paper"}
 """Comparisons that are shown beside the methods of another one."""
@@ -18,7 +18,7 @@ JOINED = {"related": "paper"}
 @cache
 def comparison(name: str) -> Results:
     """Return a published comparison."""
-    return load_results(RESULTS / name)
+    return load_results(paths.RESULTS / name)
 
 
 @cache
@@ -31,4 +31,4 @@ def joined(name: str) -> Results:
 @cache
 def study(name: str) -> Study:
     """Return a published study."""
-    return load_study(RESULTS / name)
+    return load_study(paths.RESULTS / name)

@@ -6,7 +6,8 @@ from __future__ import annotations
 from doorstate.cli.run_display import live_runs
 from doorstate.dataset.store import open_dataset
 from doorstate.evaluation.metrics import mean_and_deviation
-from doorstate.training.comparison import RunSpec, load_experiment, read_comparison, train_fold
+from doorstate.training.comparison import RunSpec, read_comparison, train_fold
+from doorstate.training.experiment import load_experiment
 from doorstate.training.run_folder import RunFolder, run_of
 
 from . import paths

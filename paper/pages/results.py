@@ -49,7 +49,11 @@ def content() -> Mapping[str, Any]:
     best = {name: frame.sort_values("f1").iloc[-1] for name, frame in summaries.items()}
     return {
         "best": best,
-        "below": [TITLES[name] for name in summaries["paper"].query("f1 < @TARGET_F1")["method"]],
+        "below": [
+            TITLES[name]
+            for name, f1 in zip(summaries["paper"]["method"], summaries["paper"]["f1"], strict=True)
+            if f1 < TARGET_F1
+        ],
         "target": TARGET_F1,
         "target_unseen": TARGET_UNSEEN_F1,
         "lowest": float(scores.min().min()),
