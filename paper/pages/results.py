@@ -116,7 +116,7 @@ def protocols_table(summaries: Mapping[str, pd.DataFrame]) -> Table:
         summaries[name].set_index("method")[["f1", "errors"]]
         for name in ("paper", "by-pose", "by-pose-mirrored")
     )
-    frame = paper.join(by_pose, lsuffix="_paper", rsuffix="_unseen").join(mirrored.add_suffix("_mirrored"))
+    frame = paper.add_suffix("_paper").join([by_pose.add_suffix("_unseen"), mirrored.add_suffix("_mirrored")])
     columns = (
         method_column(),
         number_column("f1_paper", "macro F1, paper"),

@@ -56,7 +56,8 @@ def draw_section(axes: Axes, distance_m: float) -> None:
 def draw() -> bytes:
     """Return the picture as PNG."""
     figure = Figure(figsize=(11, 8.4), layout="constrained")
-    upper, lower = np.ravel(figure.subfigures(2, 1, height_ratios=(1.75, 1)))
+    grid = figure.add_gridspec(2, 1, height_ratios=(1.75, 1))
+    upper, lower = figure.add_subfigure(grid[0]), figure.add_subfigure(grid[1])
     colors = colormaps["viridis_r"].with_extremes(bad=NO_DEPTH)
     images = upper.subplots(2, 3).ravel()
     for axes, sensor in zip(images, SENSORS, strict=True):
