@@ -126,5 +126,7 @@ def test_a_clone_stays_small() -> None:
     sizes = {name: (ROOT / name).stat().st_size for name in files if name and (ROOT / name).is_file()}
     assert sum(sizes.values()) <= 45e6
     assert sum(size for name, size in sizes.items() if name.startswith("results/")) <= 12e6
-    reports = [name for name in sizes if name.startswith("results/") and name.endswith((".html", ".png", ".svg"))]
+    reports = [
+        name for name in sizes if name.startswith("results/") and name.endswith((".html", ".png", ".svg"))
+    ]
     assert reports == []
