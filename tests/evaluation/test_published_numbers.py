@@ -20,8 +20,7 @@ RESULTS = Path(__file__).resolve().parents[2] / "results"
 
 @pytest.fixture(scope="module")
 def paper() -> Results:
-    published = RESULTS / "paper" / "experiment.json"
-    return load_results(RESULTS / "paper", None if published.is_file() else RESULTS / "ogurob-4096")
+    return load_results(RESULTS / "paper")
 
 
 def test_summary(paper: Results) -> None:

@@ -9,8 +9,10 @@ import pandas as pd
 
 from doorstate.dataset.store import PreparedDataset
 from doorstate.evaluation.predictions import load_results
+from doorstate.evaluation.run_tables import runs_table
+from doorstate.evaluation.score_tables import folds_table
 from doorstate.evaluation.table import UNDEFINED
-from doorstate.evaluation.tables import build_tables, folds_table, runs_table, save_tables
+from doorstate.evaluation.tables import build_tables, save_tables
 from tests.evaluation.conftest import MakeComparison
 
 

@@ -17,18 +17,17 @@ PROTOCOLS = {
     "paper": (
         "Folds are random within state, distance band and angle region, as in the paper. The same pose in "
         "another state, and poses 10 cm away, can be on both sides of a fold: the scores are optimistic for "
-        "doors and places never seen."
+        "unseen doors and places."
     ),
     "by-pose": (
-        "All states of a pose stay on one side of a fold, and poses within 0.5 m of a tested one are used by "
-        "nobody in that fold: no near-copy of a test cloud was trained on."
+        "All states of a pose stay on one side of a fold, and poses within 0.5 m of a tested one are "
+        "unused in that fold: no near-copy of a test cloud was trained on."
     ),
     "by-scene": (
-        "A door in its room, with all that was seen of it, stays on one side of a fold: tested doors and rooms were "
-        "never trained on."
+        "All samples of a door in its room stay on one side of a fold: tested doors and rooms were not trained on."
     ),
     "all": "Everything was trained on and nothing tested.",
-    "unseen": "Weights were trained on other data; what is tested here shares no scene and no sample with that.",
+    "unseen": "Weights were trained on other data, which share no scene and no sample with these.",
 }
 
 
@@ -64,6 +63,6 @@ def caveats(results: Results) -> list[str]:
     elif undecidable := int(is_undecidable(manifest).sum()):
         notes.append(
             f"{undecidable} frames look the same in another state of their door: no single method can be "
-            f"right on more than {number(decidable_ceiling(manifest))} of all samples."
+            f"correct on more than {number(decidable_ceiling(manifest))} of all samples."
         )
     return notes

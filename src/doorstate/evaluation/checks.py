@@ -100,6 +100,6 @@ def _check_count(run: pd.DataFrame, results: Results, fold: int, path: Path) -> 
     roles = pd.Series(results.splits[fold], dtype="str")
     states = roles.index.to_series().map(results.manifest["state"])
     expected = int(((roles == "test") & (states != NO_DOOR)).sum())
-    found = int(((run["role"] == "test") & (run["state"] != NO_DOOR)).sum())
-    if found != expected:
-        raise RunError(f"{found} of {expected} test samples of fold {fold}", path=path, hint=_AGAIN)
+    count = int(((run["role"] == "test") & (run["state"] != NO_DOOR)).sum())
+    if count != expected:
+        raise RunError(f"{count} of {expected} test samples of fold {fold}", path=path, hint=_AGAIN)

@@ -125,9 +125,14 @@ class Results:
 
     def tested_by(self, method: str) -> pd.DataFrame:
         """Return the rows of `tested` of a method."""
-        return self.tested[self.tested["method"] == method]
+        return self._tested_by_method[method]
 
-    @property
+    @cached_property
+    def _tested_by_method(self) -> dict[str, pd.DataFrame]:
+        by_method = {str(method): rows for method, rows in self.tested.groupby("method", sort=False)}
+        return {method: by_method.get(method, self.tested.iloc[:0]) for method in self.methods}
+
+    @cached_property
     def errors(self) -> pd.DataFrame:
         """Rows of `tested` whose state was not predicted, with the probability (`confidence`) of the wrong state.
 
@@ -141,6 +146,11 @@ class Results:
         return errors.assign(confidence=confidence)
 
 
+def predicted_column(name: str) -> str:
+    """Return the column of `Results.frame` with the predicted value of a manifest's column."""
+    return f"{name}_predicted"
+
+
 def join_manifest(predictions: pd.DataFrame, manifest: pd.DataFrame) -> pd.DataFrame:
     """Join predictions with a manifest indexed by `sample_id`, as `Results.frame` describes."""
     measured = [
@@ -148,8 +158,8 @@ def join_manifest(predictions: pd.DataFrame, manifest: pd.DataFrame) -> pd.DataF
         for column in predictions.columns
         if column not in TEXT_COLUMNS and column != "fold" and not column.startswith("p_")
     ]
-    renamed = predictions.rename(columns={column: f"{column}_predicted" for column in measured})
+    renamed = predictions.rename(columns={column: predicted_column(column) for column in measured})
     # Predictions win where a manifest has a column of the same name.
-    known = manifest.drop(columns=[name for name in manifest if name in renamed])
-    joined = renamed.join(known, on="sample_id")
+    truth = manifest.drop(columns=[name for name in manifest if name in renamed])
+    joined = renamed.join(truth, on="sample_id")
     return joined.assign(correct=joined["predicted"] == joined["state"])

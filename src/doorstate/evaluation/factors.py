@@ -117,8 +117,8 @@ def score_kinds(results: Results) -> pd.DataFrame:
         tested = results.tested_by(method)
         for kind, values_of in KINDS.items():
             values = values_of(tested)
-            known = sorted(set(values) - {""})
-            for value in known if len(known) > 1 else ():
+            kinds = sorted(set(values) - {""})
+            for value in kinds if len(kinds) > 1 else ():
                 correct = tested.loc[values == value, "correct"]
                 rows.append((method, kind, value, len(correct), int(correct.sum())))
     frame = pd.DataFrame(rows, columns=["method", "kind", "value", "samples", "correct"])

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from doorstate.evaluation.intervals import Interval, bootstrap_f1, grouped_interval, wilson_interval
+from doorstate.evaluation.intervals import Interval, bootstrap_f1, bounds, grouped_interval, wilson_interval
 from doorstate.evaluation.metrics import confusion, macro_f1, ratio
 from doorstate.types import ABSTAINED, PREDICTED_LABELS, STATES
 
@@ -104,8 +104,8 @@ def _score(rows: pd.DataFrame) -> dict[str, Any]:
     return {
         **_share(rows, "accuracy"),
         "f1": macro_f1(rows),
-        **_bounds("f1", _f1_interval(rows, pd.Series(range(len(rows))))),
-        **_bounds("f1_grouped", _f1_interval(rows, rows["group"])),
+        **bounds("f1", _f1_interval(rows, pd.Series(range(len(rows))))),
+        **bounds("f1_grouped", _f1_interval(rows, rows["group"])),
         "abstained": int((rows["predicted"] == ABSTAINED).sum()),
     }
 
@@ -117,8 +117,8 @@ def _share(rows: pd.DataFrame, name: str) -> dict[str, Any]:
         "groups": rows["group"].nunique(),
         "correct": int(correct.sum()),
         name: float(ratio(correct.sum(), len(rows))),
-        **_bounds(name, wilson_interval(int(correct.sum()), len(rows))),
-        **_bounds(f"{name}_grouped", grouped_interval(correct, rows["group"])),
+        **bounds(name, wilson_interval(int(correct.sum()), len(rows))),
+        **bounds(f"{name}_grouped", grouped_interval(correct, rows["group"])),
     }
 
 
@@ -149,17 +149,13 @@ def _score_without_door(predictions: pd.DataFrame) -> pd.DataFrame:
                 "label": label,
                 "frames": len(frames),
                 "predicted_states": len(predicted),
-                **_bounds("predicted_states", wilson_interval(len(predicted), len(frames))),
+                **bounds("predicted_states", wilson_interval(len(predicted), len(frames))),
                 **{state: int((predicted["predicted"] == state).sum()) for state in STATES},
                 "probability_median": probability.median(),
                 "probability_max": probability.max(),
             }
         )
     return pd.DataFrame(rows)
-
-
-def _bounds(name: str, interval: Interval) -> dict[str, float]:
-    return {f"{name}_low": interval[0], f"{name}_high": interval[1]}
 
 
 def _records(table: pd.DataFrame) -> list[dict[str, Any]]:

@@ -64,7 +64,7 @@ def _scores_table(scores: FrameScores, group: str) -> Table:
     note += (
         "."
         if group == NO_GROUP
-        else f"; and as if the frames of one {group} said no more than one of them, or drawn by {group}. "
+        else f"; and as if the frames of one {group} were copies of one, or drawn by {group}. "
         f"The truth lies between. {UNDEFINED}: too few."
     )
     table = scores.scores if scores.frames else scores.scores.iloc[:0]

@@ -123,19 +123,19 @@ def _shapes(results: Results, sample_id: str, methods: Iterable[str]) -> dict[st
 
 def _facts(row: pd.Series[Any]) -> list[str]:
     """Word what the manifest records of a sample; missing columns are passed over."""
-    known = row.dropna()
+    fields = row.dropna()
     facts = []
-    if "opening_angle_deg" in known:
-        facts.append(f"opened {known['opening_angle_deg']:.0f}°")
-    if "distance_m" in known:
-        band = f" (band {known['distance_band']} m)" if "distance_band" in known else ""
-        facts.append(f"{known['distance_m']:.2f} m away{band}")
-    if "robot_angle_deg" in known:
-        facts.append(f"seen from {known['robot_angle_deg']:.0f}° ({known.get('region', 'no region')})")
-    if "visible_leaf_px" in known:
-        facts.append(f"{known['visible_leaf_px']:.0f} leaf pixels")
-    if "same_image_as" in known:
-        facts.append(f"same image as {known['same_image_as'].replace(' ', ', ')}")
+    if "opening_angle_deg" in fields:
+        facts.append(f"opened {fields['opening_angle_deg']:.0f}°")
+    if "distance_m" in fields:
+        band = f" (band {fields['distance_band']} m)" if "distance_band" in fields else ""
+        facts.append(f"{fields['distance_m']:.2f} m away{band}")
+    if "robot_angle_deg" in fields:
+        facts.append(f"seen from {fields['robot_angle_deg']:.0f}° ({fields.get('region', 'no region')})")
+    if "visible_leaf_px" in fields:
+        facts.append(f"{fields['visible_leaf_px']:.0f} leaf pixels")
+    if "same_image_as" in fields:
+        facts.append(f"same image as {fields['same_image_as'].replace(' ', ', ')}")
     return facts
 
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 import pandas as pd
 
-from doorstate.evaluation.comparison import KEY_COLUMNS, RULE_COLUMNS, Results
+from doorstate.evaluation.comparison import KEY_COLUMNS, RULE_COLUMNS, Results, predicted_column
 from doorstate.evaluation.manifest import number_column, text_column
 from doorstate.networks.heads import HEADS, POINT_HEADS, head_metrics
 from doorstate.types import DECISION_THRESHOLD, NO_DOOR, PARTS, STATES
@@ -22,15 +22,10 @@ def head_rows(results: Results, method: str) -> pd.DataFrame | None:
         return None
     own = results.frame[(results.frame["method"] == method) & (results.frame["role"] == "test")]
     names = [name for name in map(str, results.predictions) if name not in (*KEY_COLUMNS, *RULE_COLUMNS)]
-    columns = [name if name in own else predicted(name) for name in names if name.startswith("p_")]
-    columns += [predicted(name) for name in (*names, "opening_angle_deg") if not name.startswith("p_")]
+    columns = [name if name in own else predicted_column(name) for name in names if name.startswith("p_")]
+    columns += [predicted_column(name) for name in (*names, "opening_angle_deg") if not name.startswith("p_")]
     rows = own[own[columns].notna().any(axis=1)]
     return None if rows["fold"].nunique() < len(results.runs_of(method)) else rows
-
-
-def predicted(column: str) -> str:
-    """Return the column of `Results.frame` with the predicted value of a manifest's column."""
-    return f"{column}_predicted"
 
 
 def head_errors(rows: pd.DataFrame) -> dict[str, float]:
@@ -43,7 +38,7 @@ def head_errors(rows: pd.DataFrame) -> dict[str, float]:
     """
     outputs = {}
     for name in (column for head in HEADS.values() for column in head.column_names):
-        own = name if name.startswith("p_") else predicted(name)
+        own = name if name.startswith("p_") else predicted_column(name)
         if own in rows and rows[own].notna().any():
             outputs[name] = rows[own].to_numpy(dtype=np.float64)
     names = {

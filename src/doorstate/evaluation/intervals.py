@@ -22,6 +22,11 @@ RESAMPLES = 2000
 _UNDEFINED = (float("nan"), float("nan"))
 
 
+def bounds(name: str, interval: Interval) -> dict[str, float]:
+    """Return an interval as the two columns `<name>_low` and `<name>_high`."""
+    return {f"{name}_low": interval[0], f"{name}_high": interval[1]}
+
+
 def wilson_interval(successes: float, trials: float) -> Interval:
     """Return the Wilson score interval of a proportion (Wilson 1927); NaN without trials."""
     if trials == 0:
@@ -32,7 +37,7 @@ def wilson_interval(successes: float, trials: float) -> Interval:
 
 
 def grouped_interval(correct: NDArray[np.bool_], groups: Sequence[str] | pd.Series[str]) -> Interval:
-    """Return the Wilson interval of a share as if the samples of a group said no more than one of them.
+    """Return the Wilson interval of a share as if the samples of a group were copies of one.
 
     Trials are Kish's effective number, (sum m)^2 / sum m^2 of the groups' sizes m: his design effect at an
     intraclass correlation of 1 (Kish 1965). Independent samples have `wilson_interval`; the truth lies between.
@@ -90,7 +95,7 @@ def bootstrap_f1(
 
 
 def _percentile_interval(values: NDArray[Any] | Floats) -> Interval:
-    defined = values[~np.isnan(values)]  # a resample without a state says nothing about that state's F1
+    defined = values[~np.isnan(values)]  # the F1 of a state is undefined in a resample without it
     if len(defined) == 0:
         return _UNDEFINED
     low, high = np.quantile(defined, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])

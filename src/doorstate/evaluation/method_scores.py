@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from doorstate.evaluation.comparison import Results
-from doorstate.evaluation.intervals import F1Intervals, bootstrap_f1, wilson_interval
+from doorstate.evaluation.intervals import F1Intervals, bootstrap_f1, bounds, wilson_interval
 from doorstate.evaluation.manifest import text_column
 from doorstate.evaluation.metrics import accuracy, confusion, macro_f1, mean_and_deviation, scores
 from doorstate.types import ABSTAINED, PREDICTED_LABELS, STATES
@@ -71,11 +71,11 @@ def summarize_methods(results: Results) -> pd.DataFrame:
                 "samples": total,
                 "errors": total - correct,
                 "accuracy": accuracy(counts),
-                **_bounds("accuracy", wilson_interval(correct, total)),
+                **bounds("accuracy", wilson_interval(correct, total)),
                 "precision": float(macro.precision),
                 "recall": float(macro.recall),
                 "f1": float(macro.f1),
-                **_bounds("f1", interval),
+                **bounds("f1", interval),
                 "f1_mean": mean,
                 "f1_deviation": deviation,
             }
@@ -106,11 +106,11 @@ def score_states(results: Results) -> pd.DataFrame:
                     "method": method,
                     "state": state,
                     "precision": score.precision[index],
-                    **_bounds("precision", wilson_interval(hits, int(counts[:, index].sum()))),
+                    **bounds("precision", wilson_interval(hits, int(counts[:, index].sum()))),
                     "recall": score.recall[index],
-                    **_bounds("recall", wilson_interval(hits, int(counts[index].sum()))),
+                    **bounds("recall", wilson_interval(hits, int(counts[index].sum()))),
                     "f1": score.f1[index],
-                    **_bounds("f1", intervals.per_state[index]),
+                    **bounds("f1", intervals.per_state[index]),
                     "f1_mean": mean,
                     "f1_deviation": deviation,
                 }
@@ -123,13 +123,9 @@ def score_states(results: Results) -> pd.DataFrame:
                 "precision": float(score.macro.precision),
                 "recall": float(score.macro.recall),
                 "f1": float(score.macro.f1),
-                **_bounds("f1", intervals.macro),
+                **bounds("f1", intervals.macro),
                 "f1_mean": mean,
                 "f1_deviation": deviation,
             }
         )
     return pd.DataFrame(rows)
-
-
-def _bounds(name: str, interval: tuple[float, float]) -> dict[str, float]:
-    return {f"{name}_low": interval[0], f"{name}_high": interval[1]}

@@ -44,7 +44,7 @@ def load_results(folder: Path, dataset: Path | None = None, folds: int | None = 
 
     Args:
         folder: comparison folder with `runs/<method>/fold<k>/`, or the published form.
-        dataset: data set folder, if it is not where the comparison says.
+        dataset: data set folder, if it was moved.
         folds: number of first folds to read; all if not given.
 
     Raises:

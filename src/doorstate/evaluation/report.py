@@ -41,7 +41,7 @@ def write_report(
     Args:
         folders: comparisons, finished or partly finished; several on the same samples are shown as one.
         out: made if absent.
-        dataset: data set folder, if it is not where the comparison says.
+        dataset: data set folder, if it was moved.
         folds: number of first folds to show; all if not given.
         dataset_figures: output of `draw_dataset_figures`, if they are drawn already.
 

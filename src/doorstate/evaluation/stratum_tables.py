@@ -51,36 +51,36 @@ def dataset_tables(manifest: pd.DataFrame) -> dict[str, Table]:
 
 def samples_table(manifest: pd.DataFrame) -> Table:
     """Build Table 1: samples by state, angle region and distance band."""
-    known = has_strata(manifest)
-    frame = count_samples(manifest) if known else pd.DataFrame()
-    outside = len(manifest) - int(frame[ALL].iloc[-1]) if known else 0
+    recorded = has_strata(manifest)
+    frame = count_samples(manifest) if recorded else pd.DataFrame()
+    outside = len(manifest) - int(frame[ALL].iloc[-1]) if recorded else 0
     note = f"{outside} samples lie outside these strata." if outside else ""
     titles = {**_BAND_TITLES, ALL: "total"}
     return Table.from_frame(
         "Table 1. Samples by state, angle region and distance to the door",
         frame,
         (label_column("state"), _REGION, *(count_column(band, title) for band, title in titles.items())),
-        note if known else NO_STRATA,
+        note if recorded else NO_STRATA,
     )
 
 
 def state_table(results: Results, state: str, ordinal: int) -> Table:
     """Build Tables 4 to 6: recall, precision and F1 of one state by method, angle region and distance band."""
-    known = has_strata(results.manifest)
+    recorded = has_strata(results.manifest)
     note = (
         "Recall: share (and count) of the state's samples in the stratum that were recognised. Precision: "
         f"share of the stratum's samples predicted {state} that are. {UNDEFINED}: no such sample."
     )
     return Table.from_frame(
         f"Table {ordinal}. {state.replace('_', '-').capitalize()} doors by angle region and distance",
-        _by_band(score_strata(results, state)) if known else pd.DataFrame(),
+        _by_band(score_strata(results, state)) if recorded else pd.DataFrame(),
         (
             label_column("method"),
             label_column("metric"),
             _REGION,
             *(_share_column(band, title) for band, title in _BAND_TITLES.items()),
         ),
-        note if known else NO_STRATA,
+        note if recorded else NO_STRATA,
     )
 
 
@@ -111,33 +111,33 @@ def _share(value: float, hits: float, total: float) -> str:
 
 def undecidable_table(manifest: pd.DataFrame) -> Table:
     """Build the table of frames that another state of the same pose repeats."""
-    known = records_twins(manifest)
-    ceiling = number(decidable_ceiling(manifest)) if known else ""
+    recorded = records_twins(manifest)
+    ceiling = number(decidable_ceiling(manifest)) if recorded else ""
     return Table.from_frame(
         "Undecidable frames: another state of the same pose gives the same image",
-        count_undecidable(manifest) if known else pd.DataFrame(),
+        count_undecidable(manifest) if recorded else pd.DataFrame(),
         (
             label_column("state"),
             count_column("samples"),
             count_column("undecidable"),
             number_column("share"),
         ),
-        f"No single method can be right on more than {ceiling} of all samples." if known else NO_TWINS,
+        f"No single method can be correct on more than {ceiling} of all samples." if recorded else NO_TWINS,
     )
 
 
 def decidable_table(results: Results) -> Table:
     """Build the table of accuracy with and without undecidable frames, beside the ceiling they put on it."""
-    known = records_twins(results.manifest)
+    recorded = records_twins(results.manifest)
     return Table.from_frame(
         "Accuracy with and without the undecidable frames",
-        decidable_accuracy(results) if known else pd.DataFrame(),
+        decidable_accuracy(results) if recorded else pd.DataFrame(),
         (
             label_column("method"),
             *(number_column(name) for name in ("all", "decidable", "undecidable", "ceiling")),
         ),
         "The ceiling holds for one fixed method. Under cross-validation two equal images can fall into "
         "different folds, where differently trained networks predict."
-        if known
+        if recorded
         else NO_TWINS,
     )

@@ -23,7 +23,7 @@ def records_twins(manifest: pd.DataFrame) -> bool:
 
 
 def decidable_ceiling(frame: pd.DataFrame) -> float:
-    """Return the highest accuracy that a single method can reach: of equal images, it is right on one.
+    """Return the highest accuracy that a single method can reach: of equal images, it is correct on one.
 
     Args:
         frame: columns `pose_id`, `state` and `same_image_as`.

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# Okabe & Ito's colour-blind-safe set, with a deeper red so that the paper's region names fit what is seen.
+# Okabe & Ito's colour-blind-safe set, with a deeper red to fit the paper's name of the region.
 REGION_COLORS = {
     "orange": "#E69F00",
     "red": "#B3202C",
@@ -60,7 +60,7 @@ PART_COLORS = {
 VIEW_ELEVATION_RAD = math.radians(25.0)
 
 
-# Of a legend's column in matplotlib's default font size: a letter, and the mark with its margins.
+# Widths in a legend with matplotlib's default font size: a letter, and a mark with its margins.
 _LETTER_IN, _MARK_IN = 0.076, 0.62
 
 
@@ -84,7 +84,7 @@ def outside_legend(
 
 
 def oblique_view(points: Points) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Look at a cloud from behind and above the sensor, without perspective.
+    """Project a cloud as seen from behind and above the sensor, without perspective.
 
     Args:
         points: (N, 3) metres, sensor frame.
