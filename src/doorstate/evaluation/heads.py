@@ -41,10 +41,8 @@ def head_errors(rows: pd.DataFrame) -> dict[str, float]:
         own = name if name.startswith("p_") else predicted_column(name)
         if own in rows and rows[own].notna().any():
             outputs[name] = rows[own].to_numpy(dtype=np.float64)
-    names = {
-        name for head in HEADS.values() for column in head.columns for name in (column.name, *column.manifest)
-    }
-    truth = rows[[name for name in rows if name in names and not name.startswith("p_")]].astype("object")
+    names = {column.manifest or column.name for head in HEADS.values() for column in head.columns}
+    truth = rows[[name for name in rows if name in names]].astype("object")
     texts = truth.where(truth.notna(), "").astype("str")
     return head_metrics(
         outputs, [{str(key): value for key, value in row.items()} for row in texts.to_dict("records")]
