@@ -5,12 +5,10 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 import signal
 import subprocess
 import sys
 import time
-from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -19,24 +17,11 @@ import pytest
 from doorstate._files import read_csv
 from doorstate.dataset.splits import read_splits
 from doorstate.dataset.store import PreparedDataset
-from doorstate.errors import ConfigError, DatasetError, RunError
+from doorstate.errors import ConfigError, RunError
 from doorstate.networks.weights import read_card
 from doorstate.training.comparison import compare, plan_runs, prepare_comparison
 from doorstate.training.experiment import Experiment
-
-CHANGES = {"epochs": 4, "batch_size": 8, "precision": "fp32"}
-
-
-def experiment(dataset: PreparedDataset, **changes: Any) -> Experiment:
-    values = {
-        "name": "test",
-        "dataset": str(dataset.folder),
-        "networks": ("pointnet2",),
-        "folds": 2,
-        "num_points": 128,
-        "recipe_changes": CHANGES,
-    }
-    return Experiment.model_validate(values | changes)
+from tests.training.runs import CHANGES, small_experiment
 
 
 def write(path: Path, text: str) -> Path:
@@ -47,7 +32,7 @@ def write(path: Path, text: str) -> Path:
 def test_runs_start_from_the_weights_of_another_comparison(
     small_dataset: PreparedDataset, tmp_path: Path
 ) -> None:
-    first = experiment(small_dataset, folds=1, recipe_changes=CHANGES | {"epochs": 1})
+    first = small_experiment(small_dataset, folds=1, recipe_changes=CHANGES | {"epochs": 1})
     compare(first, tmp_path / "first")
     again = first.model_copy(
         update={"start_from": str(tmp_path / "first"), "recipe_changes": CHANGES | {"epochs": 0}}
@@ -66,7 +51,7 @@ def test_runs_start_from_the_weights_of_another_comparison(
 def test_networks_without_earlier_weights_start_from_random_weights(
     small_dataset: PreparedDataset, tmp_path: Path
 ) -> None:
-    first = experiment(small_dataset, folds=1, recipe_changes=CHANGES | {"epochs": 1})
+    first = small_experiment(small_dataset, folds=1, recipe_changes=CHANGES | {"epochs": 1})
     compare(first, tmp_path / "first")
     both = {"networks": ("pointnet", "pointnet2"), "start_from": str(tmp_path / "first")}
     compare(first.model_copy(update=both), tmp_path / "again")
@@ -85,22 +70,10 @@ def test_networks_without_earlier_weights_start_from_random_weights(
         prepare_comparison(first.model_copy(update=both | {"networks": ("pointnet",)}), tmp_path / "other")
 
 
-def test_weights_trained_on_test_samples_are_refused(small_dataset: PreparedDataset, tmp_path: Path) -> None:
-    prepare_comparison(experiment(small_dataset), tmp_path / "first")
-    everything = experiment(small_dataset, protocol="all", folds=1)
-    prepare_comparison(everything, tmp_path / "all")
-    for name, is_refused in (("first", False), ("all", True)):
-        again = experiment(small_dataset, start_from=str(tmp_path / name))
-        with pytest.raises(RunError, match=r"all.*start_from") if is_refused else nullcontext():
-            prepare_comparison(again, tmp_path / f"after-{name}")
-    same_names = tmp_path / "of-another-seed"
-    shutil.copytree(small_dataset.folder, same_names)
-    elsewhere = {"start_from": str(tmp_path / "all"), "dataset": str(same_names)}
-    prepare_comparison(experiment(small_dataset).model_copy(update=elsewhere), tmp_path / "elsewhere")
-
-
 def test_training_on_all_samples_tests_none(small_dataset: PreparedDataset, tmp_path: Path) -> None:
-    everything = experiment(small_dataset, protocol="all", folds=1, recipe_changes=CHANGES | {"epochs": 2})
+    everything = small_experiment(
+        small_dataset, protocol="all", folds=1, recipe_changes=CHANGES | {"epochs": 2}
+    )
     (metrics,) = compare(everything, tmp_path / "c")
     assert metrics["train_samples"] == len(small_dataset)
     assert metrics["best_epoch"] == 1, "the last epoch"
@@ -111,17 +84,17 @@ def test_training_on_all_samples_tests_none(small_dataset: PreparedDataset, tmp_
 
 
 def test_split_is_drawn_once(small_dataset: PreparedDataset, tmp_path: Path) -> None:
-    prepare_comparison(experiment(small_dataset), tmp_path / "c")
+    prepare_comparison(small_experiment(small_dataset), tmp_path / "c")
     before = (tmp_path / "c" / "splits.csv").read_bytes()
-    prepare_comparison(experiment(small_dataset), tmp_path / "c")
+    prepare_comparison(small_experiment(small_dataset), tmp_path / "c")
     assert (tmp_path / "c" / "splits.csv").read_bytes() == before
     assert len(read_splits(tmp_path / "c" / "splits.csv")) == 5
 
 
 def test_folder_of_another_comparison_is_refused(small_dataset: PreparedDataset, tmp_path: Path) -> None:
-    prepare_comparison(experiment(small_dataset), tmp_path / "c")
+    prepare_comparison(small_experiment(small_dataset), tmp_path / "c")
     with pytest.raises(RunError) as caught:
-        prepare_comparison(experiment(small_dataset, seed=1), tmp_path / "c")
+        prepare_comparison(small_experiment(small_dataset, seed=1), tmp_path / "c")
     assert (caught.value.path, caught.value.field) == (tmp_path / "c", "seed")
 
 
@@ -136,7 +109,7 @@ def test_scenes_without_a_door_need_the_door_head(scene_dataset: PreparedDataset
 
 
 def test_runs_are_planned_fold_by_fold(small_dataset: PreparedDataset, tmp_path: Path) -> None:
-    both = experiment(small_dataset, networks=("pointnet", "dgcnn"))
+    both = small_experiment(small_dataset, networks=("pointnet", "dgcnn"))
     assert [(run.method, run.fold) for run in plan_runs(both, tmp_path)] == [
         ("pointnet", 0),
         ("dgcnn", 0),
@@ -176,7 +149,7 @@ if __name__ == "__main__":
 def test_killed_comparison_continues_exactly(
     jobs: int, small_dataset: PreparedDataset, tmp_path: Path
 ) -> None:
-    settings = experiment(small_dataset)
+    settings = small_experiment(small_dataset)
     write(tmp_path / "experiment.json", settings.model_dump_json())
     script = write(tmp_path / "script.py", SCRIPT)
     command = [sys.executable, script, tmp_path / "experiment.json", tmp_path / "killed", str(jobs)]
@@ -201,7 +174,7 @@ def test_killed_comparison_continues_exactly(
 def test_additional_data_is_trained_on_in_every_fold_and_never_tested(
     small_dataset: PreparedDataset, more_dataset: PreparedDataset, tmp_path: Path
 ) -> None:
-    plain = experiment(small_dataset, recipe_changes=CHANGES | {"epochs": 1})
+    plain = small_experiment(small_dataset, recipe_changes=CHANGES | {"epochs": 1})
     more = plain.model_copy(update={"extra_train_datasets": (str(more_dataset.folder),)})
     plain_metrics, more_metrics = compare(plain, tmp_path / "plain"), compare(more, tmp_path / "more")
     for first, second in zip(plain_metrics, more_metrics, strict=True):
@@ -220,35 +193,3 @@ def test_additional_data_is_trained_on_in_every_fold_and_never_tested(
     only_tested = {"start_from": str(tmp_path / "plain"), "recipe_changes": CHANGES | {"epochs": 0}}
     tested_metrics = compare(more.model_copy(update=only_tested), tmp_path / "tested")
     assert [run["train_samples"] for run in tested_metrics] == [run["train_samples"] for run in plain_metrics]
-
-
-def test_additional_training_data_is_not_tested_later(
-    small_dataset: PreparedDataset, scene_dataset: PreparedDataset, tmp_path: Path
-) -> None:
-    first = experiment(scene_dataset, heads=("door",), extra_train_datasets=(str(small_dataset.folder),))
-    prepare_comparison(first, tmp_path / "first")
-    with pytest.raises(RunError, match="start_from"):
-        prepare_comparison(experiment(small_dataset, start_from=str(tmp_path / "first")), tmp_path / "after")
-
-
-def test_additional_data_must_fit_and_show_other_scenes(
-    small_dataset: PreparedDataset, more_dataset: PreparedDataset, tmp_path: Path
-) -> None:
-    itself = experiment(small_dataset, extra_train_datasets=(str(small_dataset.folder),))
-    with pytest.raises(ConfigError, match=f"{len(small_dataset)} samples") as caught:
-        compare(itself, tmp_path / "comparison")
-    assert caught.value.field == "extra_train_datasets"
-    assert not (tmp_path / "comparison").exists()
-    too_many_points = experiment(
-        small_dataset, num_points=161, extra_train_datasets=(str(more_dataset.folder),)
-    )
-    with pytest.raises(ConfigError, match="161"):
-        compare(too_many_points, tmp_path / "comparison")
-    thinned = tmp_path / "thinned"
-    shutil.copytree(more_dataset.folder, thinned)
-    more_dataset.description.model_copy(update={"thin": True}).save(thinned)
-    with pytest.raises(ConfigError, match="thin"):
-        compare(experiment(small_dataset, extra_train_datasets=(str(thinned),)), tmp_path / "comparison")
-    missing = experiment(small_dataset, extra_train_datasets=(str(tmp_path / "gone"),))
-    with pytest.raises(DatasetError, match="gone"):
-        compare(missing, tmp_path / "comparison")
