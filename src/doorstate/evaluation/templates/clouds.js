@@ -155,9 +155,42 @@ const clouds = (() => {
     return window.Plotly;
   }
 
+  // Draw canvases when they come into view; `input(canvas)` returns { cloud, colors, shapes }.
+  function previewWhenVisible(canvases, input) {
+    const observer = new IntersectionObserver((changes) => {
+      for (const { target } of changes.filter((change) => change.isIntersecting && change.target.clientWidth)) {
+        observer.unobserve(target);
+        const { cloud, colors, shapes } = input(target);
+        preview(target, cloud, colors, shapes);
+      }
+    }, { rootMargin: "300px" });
+    canvases.forEach((canvas) => observer.observe(canvas));
+  }
+
+  const MAX_PLOTS = 4; // browsers drop the oldest WebGL contexts at about eight
+  const open = [];
+
+  function close({ element, plot }) {
+    window.Plotly.purge(plot);
+    element.hidden = false;
+    plot.remove();
+  }
+
+  // Replace an element by a 3D plot; the oldest of too many plots is closed.
+  function replaceByPlot(element, traces) {
+    const plot = document.createElement("div");
+    plot.className = "live";
+    element.after(plot);
+    element.hidden = true;
+    plotly().newPlot(plot, traces, layout(), config).then(() => {
+      open.push({ element, plot });
+      if (open.length > MAX_PLOTS) close(open.shift());
+    });
+  }
+
+  const config = { displaylogo: false, responsive: true };
   return {
-    data, part, bytes, decode, points, allIndices, byHeight, byPart, channelsOf, byChannels, partColors, heightColors,
-    channelColors, preview, camera, shape, shapeColor, layout, plotly,
-    config: { displaylogo: false, responsive: true },
+    data, decode, byHeight, byPart, channelsOf, byChannels, partColors, heightColors, channelColors, camera, shape,
+    previewWhenVisible, replaceByPlot, layout, plotly, config,
   };
 })();

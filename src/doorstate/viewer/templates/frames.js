@@ -1,49 +1,30 @@
 (() => {
-  const LIVE_AT_ONCE = 4; // browsers drop the oldest WebGL contexts at about eight
-  const viewOf = (node) => clouds.data.cards[node.closest(".card").dataset.file][node.closest(".cloud").dataset.method];
+  const entryOf = (node) => clouds.data.cards[node.closest(".card").dataset.file][node.closest(".cloud").dataset.method];
 
-  const whenSeen = new IntersectionObserver((entries) => {
-    for (const { target } of entries.filter((each) => each.isIntersecting && each.target.clientWidth)) {
-      whenSeen.unobserve(target);
-      const view = viewOf(target);
-      const cloud = clouds.decode(view.cloud);
-      const colors = view.channels ? clouds.channelColors(clouds.channelsOf(view)) : clouds.heightColors(cloud);
-      clouds.preview(target, cloud, colors, view.shapes);
-    }
-  }, { rootMargin: "300px" });
-  document.querySelectorAll(".cloud canvas").forEach((canvas) => whenSeen.observe(canvas));
-
-  const live = [];
-
-  function close({ plot, button }) {
-    window.Plotly.purge(plot);
-    button.closest("figure").hidden = false;
-    plot.remove();
-  }
+  clouds.previewWhenVisible(document.querySelectorAll(".cloud canvas"), (canvas) => {
+    const { cloud: encoded, channels, shapes } = entryOf(canvas);
+    const cloud = clouds.decode(encoded);
+    const colors = channels ? clouds.channelColors(clouds.channelsOf({ channels })) : clouds.heightColors(cloud);
+    return { cloud, colors, shapes };
+  });
 
   function open(button) {
-    const view = viewOf(button);
-    const cloud = clouds.decode(view.cloud);
-    const points = view.channels ? clouds.byChannels(cloud, clouds.channelsOf(view)) : clouds.byHeight(cloud);
-    const found = view.shapes.map((shape) => clouds.shape(shape, shape.name));
-    const plot = document.createElement("div");
-    plot.className = "live";
-    button.closest("figure").after(plot);
-    button.closest("figure").hidden = true;
-    clouds.plotly().newPlot(plot, [...points, clouds.camera(), ...found], clouds.layout(), clouds.config).then(() => {
-      live.push({ plot, button });
-      if (live.length > LIVE_AT_ONCE) close(live.shift());
-    });
+    const entry = entryOf(button);
+    const cloud = clouds.decode(entry.cloud);
+    const points = entry.channels ? clouds.byChannels(cloud, clouds.channelsOf(entry)) : clouds.byHeight(cloud);
+    const detections = entry.shapes.map((shape) => clouds.shape(shape, shape.name));
+    clouds.replaceByPlot(button.closest("figure"), [...points, clouds.camera(), ...detections]);
   }
 
   document.addEventListener("click", (event) => {
     const cloud = event.target.closest(".cloud");
     if (cloud) open(cloud);
-    const chip = event.target.closest(".chips button");
-    if (!chip) return;
-    for (const each of chip.parentElement.children) each.setAttribute("aria-pressed", String(each === chip));
+    const selected = event.target.closest(".chips button");
+    if (!selected) return;
+    for (const chip of selected.parentElement.children) chip.setAttribute("aria-pressed", String(chip === selected));
+    const { choice } = selected.dataset;
     for (const card of document.querySelectorAll(".card")) {
-      card.hidden = chip.dataset.choice !== "" && !JSON.parse(card.dataset.wrong).includes(chip.dataset.choice);
+      card.hidden = choice !== "" && !JSON.parse(card.dataset.wrong).includes(choice);
     }
   });
 })();

@@ -42,9 +42,9 @@
   function draw() {
     const entry = entries[current];
     plot.hidden = !entry?.cloud;
-    const color = entry?.cloud && ([selectedColor, ...colors].find((each) => each && hasColor(entry, each)));
+    const color = entry?.cloud && ([selectedColor, ...colors].find((name) => name && hasColor(entry, name)));
     for (const chip of document.querySelectorAll("[data-color]")) {
-      chip.hidden = !entries.some((each) => each.cloud && hasColor(each, chip.dataset.color));
+      chip.hidden = !entries.some((other) => other.cloud && hasColor(other, chip.dataset.color));
       chip.setAttribute("aria-pressed", String(chip.dataset.color === color));
     }
     element("note").textContent = color ? NOTES[color] : "";
