@@ -113,9 +113,7 @@ def at_10_hz(watch: DoorWatch, clouds: Iterator[Points] | list[Points]) -> list[
     ]
 
 
-def test_a_door_that_opens_is_open_when_waiting_would_be_over(
-    predictor: Predictor, clouds: list[Points]
-) -> None:
+def test_a_door_that_opens_is_open_when_waiting_would_end(predictor: Predictor, clouds: list[Points]) -> None:
     seen = [clouds[0]] * 8 + [clouds[2]] * 25
     reports = at_10_hz(DoorWatch(WatchSettings(max_hz=0), predictor), seen)
     assert reports[0].state == "unknown"
@@ -143,7 +141,7 @@ def test_missing_data_are_never_open(predictor: Predictor, clouds: list[Points])
     assert [report.state for report in reports[25:]] == ["open"] * 9 + ["unknown"] * 3
 
 
-def test_silence_is_unknown_and_forgets(predictor: Predictor, clouds: list[Points]) -> None:
+def test_silence_is_unknown_and_resets(predictor: Predictor, clouds: list[Points]) -> None:
     watch = DoorWatch(WatchSettings(), predictor)
     assert at_10_hz(watch, [clouds[2]] * 25)[-1].is_open
     silence = watch.report_silence(START_NS + 4 * 10**9)
@@ -161,7 +159,7 @@ def test_silence_is_unknown_and_forgets(predictor: Predictor, clouds: list[Point
     ("optical", "camera_link", True),
     ("body", OPTICAL, False),
 ])  # fmt: skip
-def test_frames_and_rolled_cameras_change_no_answer_and_places_come_back_in_them(
+def test_frames_and_rolled_cameras_do_not_change_the_state_and_places_are_in_them(
     frame: str, frame_id: str, optical: bool, roll_deg: int, clouds: list[Points]
 ) -> None:
     settings = parse_settings({"frame": frame, "roll": roll_deg, "rule": "wall_leaf_angle"})
@@ -177,11 +175,11 @@ def test_frames_and_rolled_cameras_change_no_answer_and_places_come_back_in_them
         != []
     )
     options = ReadOptions("optical" if optical else "body", roll_deg)
-    for shape, found in zip(report.detections, upright.prediction.detections, strict=True):
-        np.testing.assert_allclose(points_in_body(shape.points_m, options), found.points_m, atol=1e-3)
+    for detection, expected in zip(report.detections, upright.prediction.detections, strict=True):
+        np.testing.assert_allclose(points_in_body(detection.points_m, options), expected.points_m, atol=1e-3)
 
 
-def test_depth_images_need_their_camera_and_say_what_clouds_say(
+def test_depth_images_need_a_camera_and_give_the_prediction_of_clouds(
     predictor: Predictor, clouds: list[Points]
 ) -> None:
     expected = DoorWatch(WatchSettings(), predictor).process(cloud_message(clouds[2]), 0)
@@ -204,12 +202,12 @@ def test_depth_images_need_their_camera_and_say_what_clouds_say(
     assert code_after(image_message(depth_m, "rgb8")) == "unusable_cloud"
 
 
-def test_what_cannot_be_read_is_unknown_and_ends_nothing(predictor: Predictor, clouds: list[Points]) -> None:
+def test_unreadable_messages_are_unknown(predictor: Predictor, clouds: list[Points]) -> None:
     watch = DoorWatch(WatchSettings(), predictor)
     broken = cloud_message(clouds[0])
     broken.data = broken.data[:100]
     assert watch.process(broken, 0).values["reason"]
-    broken.data = "no bytes at all"
+    broken.data = "not bytes"
     damaged = watch.process(broken, 0).prediction.abstention
     assert damaged is not None
     assert damaged.code == "damaged_message"
@@ -224,15 +222,15 @@ def test_what_cannot_be_read_is_unknown_and_ends_nothing(predictor: Predictor, c
 
 
 @pytest.mark.parametrize(
-    ("camera_hz", "max_hz", "answers"), [(30, 10, 10), (15, 10, 10), (9, 10, 9), (30, 0, 30)]
+    ("camera_hz", "max_hz", "reports"), [(30, 10, 10), (15, 10, 10), (9, 10, 9), (30, 0, 30)]
 )
-def test_no_more_answers_than_asked_for_and_no_fewer(camera_hz: int, max_hz: float, answers: int) -> None:
+def test_reports_come_at_the_largest_allowed_rate(camera_hz: int, max_hz: float, reports: int) -> None:
     watch = DoorWatch(WatchSettings(max_hz=max_hz), RulePredictor.from_name("depth_region"))
     due = [watch.is_due(1000 + number / camera_hz) for number in range(10 * camera_hz)]
-    assert sum(due) == pytest.approx(10 * answers, abs=1)
+    assert sum(due) == pytest.approx(10 * reports, abs=1)
 
 
-def test_values_and_text_say_everything(clouds: list[Points]) -> None:
+def test_values_and_text_have_everything(clouds: list[Points]) -> None:
     watch = DoorWatch(parse_settings({"rule": "wall_leaf_angle"}))
     report = [watch.process(cloud_message(clouds[1], START_NS + k * 4 * 10**8), 0) for k in range(4)][-1]
     values = report.values
@@ -246,7 +244,7 @@ def test_values_and_text_say_everything(clouds: list[Points]) -> None:
     assert unknown.text == f"unknown\n{unknown.prediction.reason}"
 
 
-def test_parameters_choose_who_answers(weights: object) -> None:
+def test_parameters_choose_the_predictor(weights: object) -> None:
     assert DoorWatch(WatchSettings(points=POINTS)).predictor_name == "pointnet2, 512 points"
     assert DoorWatch(WatchSettings(weights=str(weights))).predictor_name == "pointnet, 256 points"
     assert DoorWatch(WatchSettings(rule="plane_state")).predictor_name == "rule plane_state"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Upright rectangles and a floor seen by a pinhole camera: scenes whose geometry is known, without the simulator."""
+"""Scenes with known geometry, without the simulator: upright rectangles and a floor before a pinhole camera."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The start door check: all of the lane blocked, part of it, none of it, and missing readings, never free."""
+"""Lane ahead: blocked, partly blocked, free, and never free where readings are missing."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ def _frame() -> list[Rectangle]:
 
 @pytest.mark.parametrize("distance", [1.0, 2.0, 3.5])
 def test_a_surface_across_the_lane_is_closed(distance: float) -> None:
-    answer = RULE(see(door(0, distance_m=distance)))
-    assert answer.state == DoorState.CLOSED
-    assert answer.opening_angle_deg is None
-    assert answer.detections[0].points_m[:, 0] == pytest.approx(distance, abs=0.05)
+    result = RULE(see(door(0, distance_m=distance)))
+    assert result.state == DoorState.CLOSED
+    assert result.opening_angle_deg is None
+    assert result.detections[0].points_m[:, 0] == pytest.approx(distance, abs=0.05)
 
 
 def test_a_free_lane_is_open_though_the_lintel_is_above_it() -> None:
@@ -47,23 +47,23 @@ def test_no_loss_of_readings_opens_a_closed_door(seed: int, share: float, left: 
     seen = see(door(0, distance_m=2.0))
     lost = np.random.default_rng(seed).random(seen.shape[:2]) < share
     lost[:, min(left, right) : max(left, right)] = True
-    answer = RULE(np.where(lost[..., None], np.nan, seen).astype(np.float32))
-    assert answer.state in (DoorState.CLOSED, None)
+    result = RULE(np.where(lost[..., None], np.nan, seen).astype(np.float32))
+    assert result.state in (DoorState.CLOSED, None)
 
 
-def test_an_open_way_with_an_unmeasured_strip_has_no_answer() -> None:
+def test_an_open_lane_with_an_unmeasured_strip_has_no_state() -> None:
     seen = see(_frame())
     seen[:, 150:170] = np.nan
-    answer = RULE(seen)
-    assert answer.state is None
-    assert "strips" in answer.reason
+    result = RULE(seen)
+    assert result.state is None
+    assert result.reason
 
 
 def test_a_black_leaf_under_a_window_is_not_open() -> None:
     seen = see([*_frame(), ((4.5, 3.0), (4.5, -3.0), -1.0, 1.6)])
     seen[120:] = np.nan  # the leaf and the floor; above it the room behind is measured
-    answer = RULE(seen)
-    assert answer.state is None
+    result = RULE(seen)
+    assert result.state is None
 
 
 def test_flat_and_organized_clouds_agree() -> None:
@@ -73,16 +73,16 @@ def test_flat_and_organized_clouds_agree() -> None:
 
 
 @pytest.mark.parametrize(
-    ("cloud", "reason"),
+    "cloud",
     [
-        (np.empty((0, 3), np.float32), "too few points"),
-        (np.full((48, 64, 3), np.nan, np.float32), "too few pixels"),
-        (np.zeros((48, 64, 3), np.float32), "too few pixels"),
-        (np.full((900, 3), np.nan, np.float32), "too few points"),
+        np.empty((0, 3), np.float32),
+        np.full((48, 64, 3), np.nan, np.float32),
+        np.zeros((48, 64, 3), np.float32),
+        np.full((900, 3), np.nan, np.float32),
     ],
     ids=["empty", "all NaN", "zeros", "flat NaN"],
 )
-def test_clouds_without_points_have_a_reason(cloud: np.ndarray, reason: str) -> None:
-    answer = RULE(cloud)
-    assert answer.state is None
-    assert reason in answer.reason
+def test_clouds_without_points_have_a_reason(cloud: np.ndarray) -> None:
+    result = RULE(cloud)
+    assert result.state is None
+    assert result.reason

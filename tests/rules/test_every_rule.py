@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What every rule promises: a state or a reason, whatever the cloud, and the same each time."""
+"""Contract of every rule: a state or a reason for any cloud, and the same result every time."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tests.rules.hand_made import door, see
 
 
 @pytest.mark.parametrize("name", list_rules())
-def test_the_same_cloud_has_the_same_answer(name: str) -> None:
+def test_the_same_cloud_has_the_same_result(name: str) -> None:
     cloud = see(door(40.0))
     first, second = create_rule(name)(cloud), create_rule(name)(cloud.copy())
     assert (first.state, first.reason, first.opening_angle_deg) == (
@@ -21,8 +21,8 @@ def test_the_same_cloud_has_the_same_answer(name: str) -> None:
         second.reason,
         second.opening_angle_deg,
     )
-    for one, other in zip(first.detections, second.detections, strict=True):
-        np.testing.assert_array_equal(one.points_m, other.points_m)
+    for before, after in zip(first.detections, second.detections, strict=True):
+        np.testing.assert_array_equal(before.points_m, after.points_m)
 
 
 @settings(max_examples=60, deadline=None, derandomize=True)
@@ -33,9 +33,9 @@ def test_the_same_cloud_has_the_same_answer(name: str) -> None:
     flat=st.sampled_from([(1, 1, 1), (0, 1, 1), (1, 0, 1), (1, 1, 0), (0, 0, 1), (0, 0, 0)]),
     unit=st.sampled_from([0.01, 1.0, 1000.0, 1e37]),
 )
-def test_no_heap_of_points_raises(
+def test_random_points_never_raise(
     name: str, seed: int, count: int, flat: tuple[int, int, int], unit: float
 ) -> None:
     points = np.random.default_rng(seed).normal(0, 1, (count, 3)) * flat + [2.0, 0.0, 0.1]
-    answer = create_rule(name)((points * unit).astype(np.float32))
-    assert (answer.state is None) == bool(answer.reason)
+    result = create_rule(name)((points * unit).astype(np.float32))
+    assert (result.state is None) == bool(result.reason)

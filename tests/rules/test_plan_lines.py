@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Lines in plan view: found among other points, and what is measured against them."""
+"""Lines in plan view: robust fit, distances, feet and intersections."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from doorstate.rules.plan_lines import Line, fit_line, strongest_line
 DIAGONAL = Line(np.array([2.0, 0.0]), np.array([0.6, 0.8]))
 
 
-def test_the_longer_of_two_lines_is_found_and_the_heavier_when_weighted() -> None:
+def test_the_longest_or_heaviest_line_wins() -> None:
     along = np.linspace(-1, 1, 60)[:, None]
     long = np.array([3.0, 0.0]) + along * np.array([0.0, 1.0])
     short = np.array([2.0, 0.0]) + along[:40] * np.array([0.6, 0.8])
@@ -26,7 +26,7 @@ def test_the_longer_of_two_lines_is_found_and_the_heavier_when_weighted() -> Non
 
 
 @pytest.mark.parametrize("points", [np.empty((0, 2)), np.ones((1, 2)), np.ones((9, 2))])
-def test_points_that_are_no_line_give_none(points: np.ndarray) -> None:
+def test_fewer_than_two_distinct_points_have_no_line(points: np.ndarray) -> None:
     assert strongest_line(points, 0.01) is None
 
 

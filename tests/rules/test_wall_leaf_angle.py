@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Angles of leaves in scenes of known planes, cast here plane by plane; and scenes that allow no answer."""
+"""Angles of leaves in scenes of known planes, and scenes without a result."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def leaf(angle_deg: float, hinge: float = 1.0, swing: float = 1.0, length_m: flo
     return (x, 0.0, x - hinge * length_m * math.cos(turn), swing * length_m * math.sin(turn))
 
 
-def seen(
+def render(
     boards: list[Board], x_m: float, y_m: float, turned_deg: float = 0.0, noise_m: float = 0.0
 ) -> NDArray[np.float32]:
     """Organized cloud (120, 320, 3) of boards and a floor, of a camera that looks at the opening, or beside it."""
@@ -72,51 +72,51 @@ VIEWS = [(0.0, 2.6, 0.0), (-1.0, 2.4, 0.0), (-1.4, 2.2, 10.0), (0.6, 2.8, -5.0)]
 def test_angle_and_state_are_those_of_the_leaf(
     angle_deg: float, x_m: float, y_m: float, turned_deg: float, hinge: float
 ) -> None:
-    cloud = seen([*wall(), leaf(angle_deg, hinge)], hinge * x_m, y_m, hinge * turned_deg)
-    answer = WallLeafAngleRule()(cloud)
+    cloud = render([*wall(), leaf(angle_deg, hinge)], hinge * x_m, y_m, hinge * turned_deg)
+    result = WallLeafAngleRule()(cloud)
     sight_deg = math.degrees(math.atan2(y_m, HALF_M - x_m))  # of the hinge
     edge_on = abs(sight_deg - angle_deg) < 2  # then the leaf's edge alone tells the angle
-    assert answer.opening_angle_deg == pytest.approx(angle_deg, abs=6 if edge_on else 2)
-    assert answer.state is (DoorState.SEMI_OPEN if angle_deg < 70 else DoorState.OPEN)
-    assert answer.open_or_not is (angle_deg >= 70)
-    assert {"wall", "leaf"} <= {shape.name for shape in answer.detections}
+    assert result.opening_angle_deg == pytest.approx(angle_deg, abs=6 if edge_on else 2)
+    assert result.state is (DoorState.SEMI_OPEN if angle_deg < 70 else DoorState.OPEN)
+    assert result.open_or_not is (angle_deg >= 70)
+    assert {"wall", "leaf"} <= {shape.name for shape in result.detections}
 
 
 @pytest.mark.parametrize("angle_deg", [20, 40, 60])
 def test_a_leaf_that_swings_away_opens_by_the_same_angle(angle_deg: float) -> None:
-    answer = WallLeafAngleRule()(seen([*wall(), leaf(angle_deg, swing=-1.0)], 0.3, 2.2))
-    assert answer.opening_angle_deg == pytest.approx(angle_deg, abs=2)
-    assert answer.state is DoorState.SEMI_OPEN
+    result = WallLeafAngleRule()(render([*wall(), leaf(angle_deg, swing=-1.0)], 0.3, 2.2))
+    assert result.opening_angle_deg == pytest.approx(angle_deg, abs=2)
+    assert result.state is DoorState.SEMI_OPEN
 
 
 def test_a_flat_cloud_gives_the_angle_too() -> None:
-    cloud = seen([*wall(), leaf(50)], -0.8, 2.4).reshape(-1, 3)
-    answer = WallLeafAngleRule()(cloud[np.isfinite(cloud).all(axis=1)])
-    assert answer.opening_angle_deg == pytest.approx(50, abs=2)
+    cloud = render([*wall(), leaf(50)], -0.8, 2.4).reshape(-1, 3)
+    result = WallLeafAngleRule()(cloud[np.isfinite(cloud).all(axis=1)])
+    assert result.opening_angle_deg == pytest.approx(50, abs=2)
 
 
 def test_noise_of_a_depth_camera_moves_the_angle_little() -> None:
-    answer = WallLeafAngleRule()(seen([*wall(), leaf(50)], -0.8, 2.4, noise_m=0.008))
-    assert answer.state is DoorState.SEMI_OPEN
-    assert answer.opening_angle_deg == pytest.approx(50, abs=4)
+    result = WallLeafAngleRule()(render([*wall(), leaf(50)], -0.8, 2.4, noise_m=0.008))
+    assert result.state is DoorState.SEMI_OPEN
+    assert result.opening_angle_deg == pytest.approx(50, abs=4)
 
 
-def test_the_same_cloud_gives_the_same_answer() -> None:
-    cloud = seen([*wall(), leaf(33)], -0.8, 2.4, noise_m=0.008)
+def test_the_same_cloud_gives_the_same_angle() -> None:
+    cloud = render([*wall(), leaf(33)], -0.8, 2.4, noise_m=0.008)
     assert WallLeafAngleRule()(cloud).opening_angle_deg == WallLeafAngleRule()(cloud).opening_angle_deg
 
 
 @pytest.mark.parametrize("x_m", [-1.5, 0.0, 1.5])
 def test_an_opening_without_a_leaf_is_open_and_has_a_width(x_m: float) -> None:
-    answer = WallLeafAngleRule()(seen(wall(), x_m, 2.5))
-    assert answer.state is DoorState.OPEN
-    assert answer.opening_angle_deg is None
-    assert answer.opening_width_m == pytest.approx(0.9, abs=0.1)
+    result = WallLeafAngleRule()(render(wall(), x_m, 2.5))
+    assert result.state is DoorState.OPEN
+    assert result.opening_angle_deg is None
+    assert result.opening_width_m == pytest.approx(0.9, abs=0.1)
 
 
 def test_the_outline_of_the_opening_stands_in_the_opening() -> None:
-    answer = WallLeafAngleRule()(seen(wall(), 0.0, 2.5))
-    (opening,) = (shape.points_m for shape in answer.detections if shape.name == "opening")
+    result = WallLeafAngleRule()(render(wall(), 0.0, 2.5))
+    (opening,) = (shape.points_m for shape in result.detections if shape.name == "opening")
     # The camera looks along -y of the scene from 2.5 m: x ahead, and y to the left is x of the scene.
     np.testing.assert_allclose(opening[:, 0], 2.5, atol=0.05)
     np.testing.assert_allclose(np.sort(opening[:, 1]), [-0.45, -0.45, 0.45, 0.45], atol=0.06)
@@ -124,51 +124,51 @@ def test_the_outline_of_the_opening_stands_in_the_opening() -> None:
 
 @pytest.mark.parametrize(("x_m", "y_m"), [(0.0, 2.5), (-1.5, 2.0), (2.0, 1.2)])
 @pytest.mark.parametrize("recess_m", [0.0, 0.04, 0.11])
-def test_a_wall_without_a_gap_is_closed_though_the_leaf_be_recessed(
+def test_a_wall_without_a_gap_is_closed_even_with_a_recessed_leaf(
     recess_m: float, x_m: float, y_m: float
 ) -> None:
     reveals = [(side, 0.0, side, -recess_m) for side in (-HALF_M, HALF_M)]
-    cloud = seen([*wall(), *reveals, (-HALF_M, -recess_m, HALF_M, -recess_m)], x_m, y_m)
-    answer = WallLeafAngleRule()(cloud)
-    assert answer.state is DoorState.CLOSED
-    assert answer.opening_angle_deg == 0.0
-    assert answer.open_or_not is False
+    cloud = render([*wall(), *reveals, (-HALF_M, -recess_m, HALF_M, -recess_m)], x_m, y_m)
+    result = WallLeafAngleRule()(cloud)
+    assert result.state is DoorState.CLOSED
+    assert result.opening_angle_deg == 0.0
+    assert result.open_or_not is False
 
 
-def test_a_leaf_seen_edge_on_is_found_by_its_edge() -> None:
+def test_a_leaf_seen_edge_on_is_detected_by_its_edge() -> None:
     # The camera, the leaf's free edge and the hinge are on one line.
     turn = math.radians(60)
     tip = np.array([HALF_M - 0.9 * math.cos(turn), 0.9 * math.sin(turn)])
     edge = (tip[0] - 0.02, tip[1] - 0.01, tip[0] + 0.02, tip[1] + 0.01)
     ahead = 2.9
-    cloud = seen([*wall(), edge], HALF_M - ahead * math.cos(turn), ahead * math.sin(turn))
-    answer = WallLeafAngleRule()(cloud)
-    assert answer.state is DoorState.SEMI_OPEN
-    assert answer.opening_angle_deg == pytest.approx(60, abs=6)
+    cloud = render([*wall(), edge], HALF_M - ahead * math.cos(turn), ahead * math.sin(turn))
+    result = WallLeafAngleRule()(cloud)
+    assert result.state is DoorState.SEMI_OPEN
+    assert result.opening_angle_deg == pytest.approx(60, abs=6)
 
 
 def test_a_board_too_short_for_a_leaf_leaves_the_opening_open() -> None:
-    answer = WallLeafAngleRule()(seen([*wall(), leaf(45, length_m=0.15)], -1.0, 2.4))
-    assert answer.state is DoorState.OPEN
-    assert answer.opening_angle_deg is None
+    result = WallLeafAngleRule()(render([*wall(), leaf(45, length_m=0.15)], -1.0, 2.4))
+    assert result.state is DoorState.OPEN
+    assert result.opening_angle_deg is None
 
 
-def test_a_void_wider_than_a_door_is_no_answer() -> None:
-    answer = WallLeafAngleRule()(seen(wall(half_m=0.8), 0.0, 3.5))
-    assert answer.state is None
-    assert "no door-sized opening" in answer.reason
+def test_a_void_wider_than_a_door_has_no_state() -> None:
+    result = WallLeafAngleRule()(render(wall(half_m=0.8), 0.0, 3.5))
+    assert result.state is None
+    assert result.reason
 
 
 def test_a_single_short_plane_is_no_wall() -> None:
-    answer = WallLeafAngleRule()(seen([(-0.4, 0.0, 0.4, 0.0)], 0.0, 2.5))
-    assert answer.state is None
-    assert "no wall" in answer.reason
+    result = WallLeafAngleRule()(render([(-0.4, 0.0, 0.4, 0.0)], 0.0, 2.5))
+    assert result.state is None
+    assert result.reason
 
 
 def test_a_floor_alone_is_no_wall() -> None:
-    answer = WallLeafAngleRule()(seen([], 0.0, 2.5))
-    assert answer.state is None
-    assert "no wall" in answer.reason
+    result = WallLeafAngleRule()(render([], 0.0, 2.5))
+    assert result.state is None
+    assert result.reason
 
 
 @pytest.mark.parametrize(
@@ -184,25 +184,25 @@ def test_a_floor_alone_is_no_wall() -> None:
     ],
     ids=["empty", "zeros", "nan", "image of nan", "five points", "far away", "ceiling"],
 )
-def test_a_cloud_without_points_of_use_says_so(cloud: NDArray[np.float64]) -> None:
-    answer = WallLeafAngleRule()(cloud.astype(np.float32))
-    assert answer.state is None
-    assert "too few points" in answer.reason
+def test_a_cloud_without_usable_points_has_no_state(cloud: NDArray[np.float64]) -> None:
+    result = WallLeafAngleRule()(cloud.astype(np.float32))
+    assert result.state is None
+    assert result.reason
 
 
 def test_points_that_are_all_one_are_no_wall() -> None:
-    answer = WallLeafAngleRule()(np.full((500, 3), (2.0, 0.0, 0.0), dtype=np.float32))
-    assert answer.state is None
-    assert "no wall" in answer.reason
+    result = WallLeafAngleRule()(np.full((500, 3), (2.0, 0.0, 0.0), dtype=np.float32))
+    assert result.state is None
+    assert result.reason
 
 
-def test_doors_that_gazebo_rendered_are_told_apart() -> None:
+def test_states_of_doors_rendered_by_gazebo() -> None:
     frames = json.loads((GAZEBO / "scenes.json").read_text(encoding="utf-8"))
     with np.load(GAZEBO / "depth.npz") as stored:
         depths = stored["depth"]
-    told = 0
+    correct = 0
     for frame, depth in zip(frames, depths, strict=True):
         camera = CAMERAS["xtion-gazebo"].intrinsics()
-        answer = WallLeafAngleRule()(level(depth_to_points(depth, camera), frame["camera"]["pitch"]))
-        told += answer.state is not None and frame["name"].endswith(f"_{answer.state.label}")
-    assert told >= 19
+        result = WallLeafAngleRule()(level(depth_to_points(depth, camera), frame["camera"]["pitch"]))
+        correct += result.state is not None and frame["name"].endswith(f"_{result.state.label}")
+    assert correct >= 19

@@ -26,7 +26,7 @@ AbstentionCode = Literal[
     "no_message",
 ]
 
-_SENTENCES: dict[AbstentionCode, str] = {
+SENTENCES: dict[AbstentionCode, str] = {
     "too_few_points": "too few points were measured: at least {min_points} are needed",
     "low_coverage": "only {share:.0%} of the cloud was measured: at least {min_share:.0%} are needed",
     "points_behind_camera": "{share:.0%} of the points lie behind the camera: a scan, or a cloud in another frame",
@@ -76,6 +76,6 @@ class Abstention:
         """
         if self.error is not None:
             return self.error.describe(parameter)
-        sentence = self.message or _SENTENCES[self.code].format(**self.values)
+        sentence = self.message or SENTENCES[self.code].format(**self.values)
         tries = " ".join(parameter(name, value) for name, value in self.suggestions.items())
         return f"{sentence}; try {tries}" if tries else sentence

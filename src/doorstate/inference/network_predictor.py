@@ -118,7 +118,7 @@ class NetworkPredictor(Predictor):
             CloudContentError: a cloud that is none or not in metres, or one cloud in place of several.
         """
         started = self.clock()
-        samples = [self._sample(check_single_cloud(cloud)) for cloud in _several(clouds)]
+        samples = [self._clean_sample_and_gate(cloud) for cloud in _several(clouds)]
         accepted = [sample.points for sample in samples if sample.abstention is None]
         outputs = iter(run_by_size(self.backend, accepted))
         milliseconds = (self.clock() - started) * 1000 / max(1, len(samples))
@@ -151,8 +151,9 @@ class NetworkPredictor(Predictor):
         cloud = np.random.default_rng(0).normal(2.0, 1.0, (self.num_points, 3)).astype(np.float32)
         self.backend(prepare_cloud(cloud, CloudSpec(num_points=self.num_points)).points[None])
 
-    def _sample(self, cloud: Points) -> _Sample:
-        """Return the points for the network, and the reason why it must not be run."""
+    def _clean_sample_and_gate(self, cloud: Points) -> _Sample:
+        """Return the points for the network, and the reason if it must not be run."""
+        cloud = check_single_cloud(cloud)
         try:
             points = self.prepare(cloud).points
         except TooFewPointsError as error:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Simulated doors that no weights were trained on, to compare and to measure with: the same ones every time."""
+"""Simulated doors that no weights were trained on, the same every time, for comparisons and measurements."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ _SEED = 1_000_003  # of no data set
 
 
 class LabelledClouds(NamedTuple):
-    """What to compare on."""
+    """Prepared clouds with the states of their doors."""
 
     points: Points  # (M, n, 3) metres in farthest-point order
     labels: NDArray[np.int64]  # (M,)
 
 
 def reference_rows(count: int) -> list[Row]:
-    """Rows of doors in all three states, poses spread over the room."""
+    """Return rows of doors in all three states, with poses spread over the room."""
     poses = PRESETS["ogurob"].indices(max(3, -(-count // len(STATES))))
     return [row for pose in poses for row in draw_rows(PRESETS["ogurob"], _SEED, pose)][:count]
 
 
 def reference_clouds(count: int, num_points: int, progress: Progress = no_progress) -> LabelledClouds:
-    """Render and prepare `reference_rows`.
+    """Return the rendered and prepared `reference_rows`.
 
     Raises:
         ConfigError: more points than a simulated cloud has.
