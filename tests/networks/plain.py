@@ -22,13 +22,13 @@ def knn(query: Tensor, points: Tensor, k: int) -> Tensor:
 
 def ball_query(centres: Tensor, points: Tensor, radius: float, num_samples: int) -> Tensor:
     """First hits in index order, padded with the first."""
-    indices_of_hits = torch.zeros(*centres.shape[:2], num_samples, dtype=torch.int64)
+    ball_indices = torch.zeros(*centres.shape[:2], num_samples, dtype=torch.int64)
     for b in range(centres.shape[0]):
         for m, centre in enumerate(centres[b]):
             hits = [j for j, point in enumerate(points[b]) if ((point - centre) ** 2).sum() < radius**2]
             hits = (hits + [hits[0]] * num_samples)[:num_samples]
-            indices_of_hits[b, m] = torch.tensor(hits)
-    return indices_of_hits
+            ball_indices[b, m] = torch.tensor(hits)
+    return ball_indices
 
 
 def gather(values: Tensor, indices: Tensor) -> Tensor:
