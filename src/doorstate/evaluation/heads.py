@@ -41,12 +41,10 @@ def head_errors(rows: pd.DataFrame) -> dict[str, float]:
         own = name if name.startswith("p_") else predicted_column(name)
         if own in rows and rows[own].notna().any():
             outputs[name] = rows[own].to_numpy(dtype=np.float64)
-    names = {column.manifest or column.name for head in HEADS.values() for column in head.columns}
-    truth = rows[[name for name in rows if name in names]].astype("object")
-    texts = truth.where(truth.notna(), "").astype("str")
-    return head_metrics(
-        outputs, [{str(key): value for key, value in row.items()} for row in texts.to_dict("records")]
-    )
+    sources = sorted({column.source for head in HEADS.values() for column in head.columns} & {*rows})
+    truth = rows[sources].astype("object")
+    records = truth.where(truth.notna(), None).to_dict("records")
+    return head_metrics(outputs, [{str(name): value for name, value in row.items()} for row in records])
 
 
 def score_heads(results: Results) -> pd.DataFrame:

@@ -48,6 +48,6 @@ ANGLE_HEAD = HeadSpec(
     to_columns=_to_columns,
     metrics=(
         Metric("angle_error_semi_open_deg", "opening angle, semi-open: mean error, °", 1, _error_semi_open),
-        Metric("angle_error_open_deg", "open", 1, _error_open),
+        Metric("angle_error_open_deg", "opening angle, open: mean error, °", 1, _error_open),
     ),
 )

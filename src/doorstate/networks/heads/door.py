@@ -26,5 +26,5 @@ DOOR_HEAD = HeadSpec(
     num_outputs=1,
     decode=sigmoid,
     loss=binary_cross_entropy,
-    metrics=(Metric("door_auroc", "door, AUROC", 4, _auroc),),
+    metrics=(Metric("door_auroc", "door: AUROC", 4, _auroc),),
 )

@@ -87,7 +87,7 @@ FRAME_HEAD = HeadSpec(
     augment=_augment,
     metrics=(
         Metric("frame_position_error_median_m", "frame position: median error, m", 3, _position_error_median),
-        Metric("frame_position_error_p90_m", "90th percentile", 3, _position_error_p90),
-        Metric("frame_yaw_error_median_deg", "yaw: median error, °", 1, _yaw_error_median),
+        Metric("frame_position_error_p90_m", "frame position: 90th percentile, m", 3, _position_error_p90),
+        Metric("frame_yaw_error_median_deg", "frame yaw: median error, °", 1, _yaw_error_median),
     ),
 )

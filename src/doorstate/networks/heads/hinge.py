@@ -47,7 +47,7 @@ HINGE_HEAD = HeadSpec(
     loss=binary_cross_entropy,
     augment=_augment,
     metrics=(
-        Metric("hinge_accuracy", "hinge side", 4, _accuracy),
-        Metric("hinge_accuracy_not_closed", "of doors not closed", 4, _accuracy_not_closed),
+        Metric("hinge_accuracy", "hinge side: accuracy", 4, _accuracy),
+        Metric("hinge_accuracy_not_closed", "hinge side, not closed: accuracy", 4, _accuracy_not_closed),
     ),
 )

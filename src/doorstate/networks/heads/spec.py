@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Values = NDArray[np.float32]
 States = NDArray[np.str_]
-ManifestRow = Mapping[str, str]
+ManifestRow = Mapping[str, Any]
+"""Line of a manifest, text or numbers by column; "" or None is a missing value."""
 Columns = dict[str, Floats]
 """(M,) numbers by column name."""
 
@@ -32,12 +33,17 @@ class Column:
     name: str
     unit: str  # "m", "deg", or "" for a probability
     manifest: str = ""  # column of the manifest; the same name if empty
-    parse: Callable[[str], float] = float
+    parse: Callable[[Any], float] = float
+
+    @property
+    def source(self) -> str:
+        """Column of the manifest with the true value."""
+        return self.manifest or self.name
 
     def truth(self, rows: Sequence[ManifestRow]) -> Floats:
         """Return the (M,) true values of manifest rows, NaN where there is none."""
-        texts = (row.get(self.manifest or self.name, "") for row in rows)
-        return np.array([self.parse(text) if text else math.nan for text in texts])
+        cells = (row.get(self.source) for row in rows)
+        return np.array([math.nan if cell in (None, "") else self.parse(cell) for cell in cells])
 
 
 @dataclass(frozen=True)
