@@ -16,7 +16,8 @@ from doorstate._jobs import Progress
 from doorstate.evaluation.table import Table
 from doorstate.io.camera import Intrinsics
 from doorstate.simulation.camera import CameraPose
-from doorstate.simulation.noise.models import SENSORS, SensorModel, distort
+from doorstate.simulation.noise.model import SensorModel, distort
+from doorstate.simulation.noise.sensors import SENSORS
 from doorstate.simulation.render import incidence, is_made_of, render, render_behind_glass
 from doorstate.simulation.scene import Box, Material
 from doorstate.types import DepthImage, Part

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from doorstate.io.depth import depth_to_points
 from doorstate.simulation.camera import CameraPose
-from doorstate.simulation.noise.models import SENSORS, sense
+from doorstate.simulation.noise.model import sense
+from doorstate.simulation.noise.sensors import SENSORS
 from doorstate.simulation.render import render_behind_glass
 from doorstate.simulation.scene import Door, Opening, Scene, scene_boxes
 from doorstate.types import DepthImage

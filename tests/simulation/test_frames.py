@@ -16,7 +16,7 @@ from doorstate.simulation.camera import DepthCamera
 from doorstate.simulation.frames import level, replay
 from doorstate.simulation.generate import simulate_rows
 from doorstate.simulation.manifest import flatten, unflatten
-from doorstate.simulation.noise.models import find_sensor
+from doorstate.simulation.noise.sensors import find_sensor
 from doorstate.simulation.presets import PRESETS, Preset, PresetName, draw_rows
 from doorstate.simulation.row import Row
 from doorstate.simulation.scene import Box

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Twenty frames rendered by Gazebo 11.1: our caster sees the same, and our doors are the doors it was given."""
+"""Twenty frames rendered by Gazebo 11.1: our renderer gives the same depth, and our doors the same boxes."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from doorstate.types import Part
 
 GAZEBO = Path(__file__).resolve().parents[1] / "fixtures" / "gazebo"
 FRAMES: list[dict[str, Any]] = json.loads((GAZEBO / "scenes.json").read_text(encoding="utf-8"))
-# These also have side walls, ceilings or furniture that no door brings along.
+# Frames with side walls, ceilings or furniture in addition to the door.
 FURNISHED = {15, 16, 17, 19}
 
 
@@ -39,41 +39,41 @@ def corners(box: Box) -> NDArray[np.float64]:
     return signs * np.array(box.size_m) @ rotation.T + np.array(box.center_m)  # (8, 3)
 
 
-def same_box(one: Box, other: Box) -> bool:
-    apart = np.linalg.norm(corners(one)[:, None] - corners(other)[None], axis=-1)
-    return one.part == other.part and max(apart.min(axis=0).max(), apart.min(axis=1).max()) < 1e-4
+def same_box(box: Box, target: Box) -> bool:
+    apart = np.linalg.norm(corners(box)[:, None] - corners(target)[None], axis=-1)
+    return box.part == target.part and max(apart.min(axis=0).max(), apart.min(axis=1).max()) < 1e-4
 
 
-def matches(boxes: Sequence[Box], others: Sequence[Box]) -> list[list[int]]:
-    """For every box, which of the others it is."""
-    return [[number for number, other in enumerate(others) if same_box(box, other)] for box in boxes]
+def matches(boxes: Sequence[Box], targets: Sequence[Box]) -> list[list[int]]:
+    """Return, for every box, the numbers of the equal boxes."""
+    return [[number for number, target in enumerate(targets) if same_box(box, target)] for box in boxes]
 
 
-def test_the_caster_equals_gazebo() -> None:
+def test_rendering_equals_gazebo() -> None:
     with np.load(GAZEBO / "depth.npz") as stored:
         expected = stored["depth"]
     camera = CAMERAS["xtion-gazebo"]
-    found = np.empty_like(expected)
+    rendered = np.empty_like(expected)
     for number, frame in enumerate(FRAMES):
-        at = frame["camera"]
-        pose = CameraPose(at["x"], at["y"], at["z"], at["yaw"], at["pitch"])
-        found[number] = cut_range(render(fixture_boxes(frame), pose, camera.intrinsics()), camera).depth_m
+        camera_pose = frame["camera"]
+        pose = CameraPose(*(camera_pose[name] for name in ("x", "y", "z", "yaw", "pitch")))
+        rendered[number] = cut_range(render(fixture_boxes(frame), pose, camera.intrinsics()), camera).depth_m
     assert expected.shape == (20, 480, 640)
     measured = np.isfinite(expected)
     assert measured.mean() > 0.5
-    one_sided = int((measured != np.isfinite(found)).sum())
-    apart_m = np.abs(expected - found)[measured & np.isfinite(found)]
+    one_sided = int((measured != np.isfinite(rendered)).sum())
+    apart_m = np.abs(expected - rendered)[measured & np.isfinite(rendered)]
     assert np.quantile(apart_m, 0.999) < 1e-4
     assert one_sided + int((apart_m > 1e-3).sum()) < 1e-4 * expected.size
 
 
 @pytest.mark.parametrize("frame", FRAMES, ids=lambda frame: frame["name"])
-def test_the_door_is_the_one_gazebo_was_given(frame: dict[str, Any]) -> None:
+def test_the_boxes_of_the_door_equal_those_of_gazebo(frame: dict[str, Any]) -> None:
     door = Door(hinge=frame["hinge"], swing=frame["swing"])
     ours = scene_boxes(Scene(door=door, has_ceiling=False), Opening(angle_deg=frame["opening_angle_deg"]))
     theirs = fixture_boxes(frame)
-    found = matches(ours, theirs)
-    assert all(len(match) == 1 for match in found)
-    assert len({match[0] for match in found}) == len(ours)
+    equal = matches(ours, theirs)
+    assert all(len(match) == 1 for match in equal)
+    assert len({match[0] for match in equal}) == len(ours)
     extra = len(theirs) - len(ours)
     assert extra > 0 if frame["index"] in FURNISHED else extra == 0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Worlds for Gazebo: read back by another reader, they hold the scene's boxes and give the row's depth."""
+"""Worlds for Gazebo: read back, they hold the scene's boxes and give the row's depth."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def read_camera(world: ET.Element) -> tuple[CameraPose, DepthCamera]:
 @pytest.mark.parametrize(
     "row", [*ROWS, GLASS, draw_rows(PRESETS["ogurob"], 0, 700)[1]], ids=lambda row: row.sample_id
 )
-def test_a_world_read_back_gives_the_same_boxes_and_the_same_depth(row: Row) -> None:
+def test_a_world_reads_back_to_the_same_boxes_and_depth(row: Row) -> None:
     root = ET.fromstring(sdf_world(row, row.sample_id))
     assert (root.tag, root.get("version")) == ("sdf", "1.7")
     world = root.find("world")
@@ -80,6 +80,6 @@ def test_a_world_read_back_gives_the_same_boxes_and_the_same_depth(row: Row) -> 
     np.testing.assert_allclose(depth, replay(row).cut.depth_m, atol=1e-6)
 
 
-def test_a_camera_that_gazebo_does_not_have_is_refused() -> None:
-    with pytest.raises(ConfigError, match="not centred"):
+def test_an_off_centre_camera_is_refused() -> None:
+    with pytest.raises(ConfigError, match="centred"):
         sdf_world(with_sensor(ROWS[0], "deepdoors2"), "world")

@@ -10,7 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from doorstate.io.depth import depth_to_points
-from doorstate.simulation.noise.models import find_sensor, sense
+from doorstate.simulation.noise.model import sense
+from doorstate.simulation.noise.sensors import find_sensor
 from doorstate.simulation.noise.streams import sample_seed
 from doorstate.simulation.render import Render, render_behind_glass
 from doorstate.simulation.row import Row

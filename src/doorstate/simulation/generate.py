@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from doorstate.simulation.camera import DepthCamera
 from doorstate.simulation.frames import Frame, depth_sha256, replay
-from doorstate.simulation.noise.models import find_sensor
+from doorstate.simulation.noise.sensors import find_sensor
 from doorstate.simulation.occlusion import DoorView, occluded_bin
 from doorstate.simulation.presets import Preset, draw_rows
 from doorstate.simulation.render import cut_range

@@ -55,7 +55,7 @@ class Row(FrozenModel):
     door_z_m: float | None = None
     door_yaw_deg: float | None = None
     seed: int
-    sensor: str = "none"  # a name for noise.models.find_sensor
+    sensor: str = "none"  # a name for noise.sensors.find_sensor
     camera: DepthCamera
     scene: Scene
     clutter_tries: int = 0

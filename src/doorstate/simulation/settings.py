@@ -11,7 +11,7 @@ from doorstate._models import FrozenModel
 from doorstate.errors import ConfigError
 from doorstate.simulation.frames import Frame
 from doorstate.simulation.generate import simulate_rows
-from doorstate.simulation.noise.models import find_sensor
+from doorstate.simulation.noise.sensors import find_sensor
 from doorstate.simulation.presets import PRESETS, Preset
 from doorstate.simulation.row import Row
 

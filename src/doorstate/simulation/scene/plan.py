@@ -14,22 +14,22 @@ from doorstate.simulation.scene.box import Box
 TOLERANCE_M = 0.005  # a leaf's edge is bevelled by about as much as its corner would cut into the jamb
 
 
-def collide(boxes: Sequence[Box], others: Sequence[Box], tolerance_m: float = TOLERANCE_M) -> bool:
-    """Return True if a box overlaps one of the others by more than the tolerance.
+def collide(boxes: Sequence[Box], obstacles: Sequence[Box], tolerance_m: float = TOLERANCE_M) -> bool:
+    """Return True if a box overlaps an obstacle by more than the tolerance.
 
     Separating axis test in plan, and the overlap in height.
     """
-    if not boxes or not others:
+    if not boxes or not obstacles:
         return False
     center, axes, half = _plans(boxes, 1)
-    other_center, other_axes, other_half = _plans(others, 0)
-    apart = other_center - center  # (N, M, 3)
-    separated = np.abs(apart[..., 2]) > half[..., 2] + other_half[..., 2] - tolerance_m
+    obstacle_center, obstacle_axes, obstacle_half = _plans(obstacles, 0)
+    apart = obstacle_center - center  # (N, M, 3)
+    separated = np.abs(apart[..., 2]) > half[..., 2] + obstacle_half[..., 2] - tolerance_m
     # |cosine| between every axis of one box and every axis of the other: (N, M, 2, 2)
-    cosines = np.abs(np.einsum("...ix,...jx->...ij", axes, other_axes))
+    cosines = np.abs(np.einsum("...ix,...jx->...ij", axes, obstacle_axes))
     for own_axes, own, opposite, rotated in (
-        (axes, half, other_half, cosines),
-        (other_axes, other_half, half, cosines.swapaxes(-1, -2)),
+        (axes, half, obstacle_half, cosines),
+        (obstacle_axes, obstacle_half, half, cosines.swapaxes(-1, -2)),
     ):
         away = np.abs(np.einsum("...ix,...x->...i", own_axes, apart[..., :2]))
         reach = own[..., :2] + np.einsum("...ij,...j->...i", rotated, opposite[..., :2])
@@ -37,15 +37,15 @@ def collide(boxes: Sequence[Box], others: Sequence[Box], tolerance_m: float = TO
     return bool((~separated).any())
 
 
-def distance_m(one: Box, other: Box) -> float:
+def distance_m(box: Box, target: Box) -> float:
     """Return the shortest distance in plan between two boxes; 0 if they overlap in plan."""
-    tall, tall_other = (box._replace(center_m=(*box.center_m[:2], 0.0)) for box in (one, other))
-    if collide([tall], [tall_other], 0.0):
+    level, target_level = (shape._replace(center_m=(*shape.center_m[:2], 0.0)) for shape in (box, target))
+    if collide([level], [target_level], 0.0):
         return 0.0
-    corners, other_corners = footprint(one), footprint(other)
+    corners, target_corners = footprint(box), footprint(target)
     return min(
         _to_segment(point, edges[side - 1], edges[side])
-        for points, edges in ((corners, other_corners), (other_corners, corners))
+        for points, edges in ((corners, target_corners), (target_corners, corners))
         for point in points
         for side in range(4)
     )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Each stage of a sensor model for itself, on depth images made by hand."""
+"""Stages of sensor models, one at a time, on depth images made by hand."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ STAGES: dict[str, Callable[[DepthImage, np.random.Generator], DepthImage]] = {
 @pytest.mark.parametrize("stage", STAGES.values(), ids=STAGES)
 @given(depth_m=depths, seed=st.integers(0, 99))
 @settings(deadline=None, max_examples=30)
-def test_what_is_lost_stays_lost_and_the_input_stays_as_it_was(
+def test_lost_pixels_stay_lost_and_the_input_is_unchanged(
     stage: Callable[[DepthImage, np.random.Generator], DepthImage], depth_m: DepthImage, seed: int
 ) -> None:
     before = depth_m.copy()
@@ -73,10 +73,10 @@ def test_what_is_lost_stays_lost_and_the_input_stays_as_it_was(
 @settings(deadline=None, max_examples=200)
 def test_shadows_equal_a_loop_over_pairs_of_pixels(row: list[float]) -> None:
     depth_m = np.array([row, row[::-1]], np.float32)
-    found = np.isnan(hide_from_second_view(depth_m, SecondView(baseline_m=0.01), 512.0))
-    # In float32 as there, so that both stand on the same side of a column's border.
+    hidden = np.isnan(hide_from_second_view(depth_m, SecondView(baseline_m=0.01), 512.0))
+    # In float32 as in the stage, so that both fall on the same side of a column's border.
     scale = np.float32(512.0 * 0.01)
-    for line, lost in zip(depth_m, found, strict=True):
+    for line, lost in zip(depth_m, hidden, strict=True):
         disparity = scale / line
         column = np.floor(np.arange(len(line), dtype=np.float32) - disparity)
         expected = [
@@ -93,7 +93,7 @@ def test_shadows_equal_a_loop_over_pairs_of_pixels(row: list[float]) -> None:
         assert lost.tolist() == expected
 
 
-def test_a_thin_pole_throws_a_shadow_of_its_own_width_beside_it() -> None:
+def test_a_thin_pole_casts_a_shadow_of_its_own_width() -> None:
     depth_m = np.full((3, 200), 3.0, np.float32)
     depth_m[:, 100:110] = 1.0
     lost = np.isnan(hide_from_second_view(depth_m, PROJECTOR, FOCAL_PX))
@@ -105,16 +105,16 @@ def test_a_thin_pole_throws_a_shadow_of_its_own_width_beside_it() -> None:
     assert (lost == lost[0]).all()
 
 
-def test_a_plane_hides_nothing_of_itself() -> None:
+def test_a_plane_casts_no_shadow_on_itself() -> None:
     for slope in (-0.4, 0.0, 0.4, 2.0):
         u = np.arange(640, dtype=np.float32) - np.float32(319.7)
         plane = 1.5 / (1 + slope * u / FOCAL_PX)
-        seen = np.where((plane > 0.3) & (plane < 8), plane, np.inf).astype(np.float32)
-        lost = np.isnan(hide_from_second_view(np.tile(seen, (2, 1)), PROJECTOR, FOCAL_PX)[0])
-        assert not lost[np.isfinite(seen)].any()
+        rendered = np.where((plane > 0.3) & (plane < 8), plane, np.inf).astype(np.float32)
+        lost = np.isnan(hide_from_second_view(np.tile(rendered, (2, 1)), PROJECTOR, FOCAL_PX)[0])
+        assert not lost[np.isfinite(rendered)].any()
 
 
-def test_shadows_of_an_upright_camera_lie_above() -> None:
+def test_shadows_of_an_upright_camera_lie_above_the_object() -> None:
     depth_m = np.full((200, 6), 3.0, np.float32)
     depth_m[100:] = 1.0
     lost = np.isnan(hide_from_second_view(depth_m, SecondView(baseline_m=0.075, towards="down"), FOCAL_PX))
@@ -123,7 +123,7 @@ def test_shadows_of_an_upright_camera_lie_above() -> None:
 
 @given(depth_m=depths)
 @settings(deadline=None, max_examples=50)
-def test_rounding_disparity_moves_depth_by_half_a_step_at_most_and_only_once(depth_m: DepthImage) -> None:
+def test_rounding_disparity_moves_depth_by_at_most_half_a_step(depth_m: DepthImage) -> None:
     rounded = round_disparity(depth_m, STEPS, FOCAL_PX)
     finite = np.isfinite(rounded)
     apart_px = FOCAL_PX * 0.075 * np.abs(1 / depth_m[finite] - 1 / rounded[finite])
@@ -131,14 +131,14 @@ def test_rounding_disparity_moves_depth_by_half_a_step_at_most_and_only_once(dep
     np.testing.assert_allclose(round_disparity(rounded, STEPS, FOCAL_PX), rounded, rtol=1e-6)
 
 
-def test_an_8_bit_file_keeps_no_depth_below_half_a_step_nor_beyond_its_bits() -> None:
+def test_an_8_bit_file_has_no_depth_below_half_a_step_or_beyond_its_bits() -> None:
     depth_m = np.array([[0.03, 0.04, 2.03, 2.04, 15.96, 15.98, np.inf, np.nan]], np.float32)
     kept = round_depth(depth_m, DepthSteps(step_m=1 / 16, bits=8))
     expected = [np.nan, 0.0625, 2.0, 2.0625, 15.9375, np.nan, np.nan, np.nan]
     np.testing.assert_array_equal(kept, np.array([expected], np.float32))
 
 
-def test_a_jump_gives_nothing_or_a_depth_between_and_nothing_else_changes() -> None:
+def test_pixels_beside_a_jump_are_lost_or_between_both_depths() -> None:
     depth_m = np.full((4000, 6), 2.0, np.float32)
     depth_m[:, 3:] = 2.5
     after = blur_edges(depth_m, depth_m, Edges(), stage_rng(1, "edges"))
@@ -149,11 +149,11 @@ def test_a_jump_gives_nothing_or_a_depth_between_and_nothing_else_changes() -> N
     between = (left > 2.0) & (left < 2.5)
     assert between.mean() == pytest.approx(0.1, abs=0.02)
     assert ((left >= 2.0) & (left <= 2.5)).all()
-    # A jump of the measurements alone is noise.
+    # A jump of the measurements without one of the surfaces is noise.
     np.testing.assert_array_equal(
         blur_edges(depth_m, zeros(depth_m), Edges(lost=1), stage_rng(1, "edges")), depth_m
     )
-    # Four per cent is no jump; a lost neighbour is no surface; the sky is a jump, but nothing flies there.
+    # Four per cent is no jump; a lost neighbour is no surface; the sky is a jump, but no pixel takes a depth between.
     flat = np.array([[2.0, 2.08, 2.0, np.nan, 2.5]], np.float32)
     np.testing.assert_array_equal(blur_edges(flat, flat, Edges(lost=1), stage_rng(0, "edges")), flat)
     sky = np.tile(np.array([[2.0, np.inf]], np.float32), (200, 1))
@@ -163,13 +163,15 @@ def test_a_jump_gives_nothing_or_a_depth_between_and_nothing_else_changes() -> N
     assert np.isnan(torn[:, 0]).mean() == pytest.approx(0.5, abs=0.12)
 
 
-def test_measurements_move_between_surfaces_near_their_edge_only() -> None:
+def test_measurements_move_only_between_surfaces_near_an_edge() -> None:
     box = np.zeros((2000, 40), np.int16)
     box[:, 20:] = 1
     depth_m = np.tile(np.linspace(1, 3, 40, dtype=np.float32), (2000, 1))
     depth_m[5, 19] = np.nan
-    seen = Render(depth_m, np.zeros(box.shape, np.uint8), box)
-    targets, sources = draw_moves(seen, np.zeros(box.shape, np.float32), Lateral(), stage_rng(3, "lateral"))
+    rendered = Render(depth_m, np.zeros(box.shape, np.uint8), box)
+    targets, sources = draw_moves(
+        rendered, np.zeros(box.shape, np.float32), Lateral(), stage_rng(3, "lateral")
+    )
     # Beside the edge a normal deviate of 0.8 px reaches across it, by half a pixel, in 26.6 % of the pixels.
     assert np.isin(targets % 40, (19, 20)).sum() / 4000 == pytest.approx(0.266, abs=0.03)
     assert len(np.unique(targets)) == len(targets)
@@ -196,12 +198,10 @@ def test_lateral_noise_grows_with_incidence_as_published() -> None:
         (4, 75, 25.82 + 1.25),
     ],
 )
-def test_axial_noise_is_that_of_the_published_table(
-    depth_m: float, angle_deg: float, sigma_mm: float
-) -> None:
+def test_axial_noise_equals_the_published_table(depth_m: float, angle_deg: float, sigma_mm: float) -> None:
     depth, angle = np.array([[depth_m]], np.float32), np.radians(np.array([[angle_deg]], np.float32))
-    found = 1000 * NguyenAxial().sigma_m(depth, angle, 0.0).item()
-    assert found == pytest.approx(sigma_mm, abs=0.06)
+    sigma = 1000 * NguyenAxial().sigma_m(depth, angle, 0.0).item()
+    assert sigma == pytest.approx(sigma_mm, abs=0.06)
 
 
 def test_axial_noise_is_normal() -> None:
@@ -223,7 +223,7 @@ def test_speckle_is_clustered() -> None:
     assert beside > 0.7  # four of five pixels of a square have one to their right
 
 
-def test_streams_of_samples_and_stages_are_their_own() -> None:
+def test_streams_of_samples_and_stages_are_independent() -> None:
     seeds = {
         sample_seed(seed, name) for seed in range(30) for name in ("p0000-closed", "p0000-open", "p0001-open")
     }
@@ -231,6 +231,6 @@ def test_streams_of_samples_and_stages_are_their_own() -> None:
     stages = ("materials", "lateral", "axial", "grazing", "edges", "speckle")
     draws = np.array([stage_rng(seed, stage).random(2000) for seed in (0, 1) for stage in stages])
     assert np.abs(np.corrcoef(draws) - np.eye(12)).max() < 0.12
-    # A longer seed that ends in zeros is the shorter one to numpy: none of ours is.
+    # numpy pads short seeds with zeros: [0] and [0, 0] are one stream, and none of ours equals it.
     plain = np.random.default_rng([0, 0]).random(2000)
     assert not any(np.array_equal(plain, stream) for stream in draws)
