@@ -45,7 +45,7 @@ python_use_unqualified_type_names = True
 nitpick_ignore_regex = [
     (
         "py:.*",
-        r"(numpy|np|torch|pydantic|annotated_types|collections|pathlib|typing|types|fastapi|enum|abc)\..*",
+        r"(numpy|np|pandas|pd|torch|pydantic|annotated_types|collections|pathlib|typing|types|fastapi|enum|abc)\..*",
     ),
     ("py:.*", r"doorstate\.(simulation|dataset|training|evaluation|rules\.walls)\..*"),
     (
@@ -56,7 +56,12 @@ nitpick_ignore_regex = [
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 # Pages that live outside this folder, where GitHub looks for them, by their name in the site.
-_OUTSIDE_PAGES = {"changelog": "CHANGELOG.md", "contributing": "CONTRIBUTING.md", "ros2": "ros2/README.md"}
+_OUTSIDE_PAGES = {
+    "changelog": "CHANGELOG.md",
+    "contributing": "CONTRIBUTING.md",
+    "log": "paper/log.md",
+    "ros2": "ros2/README.md",
+}
 
 
 def _complete_page(app: Sphinx, page: str, source: list[str]) -> None:
@@ -65,6 +70,7 @@ def _complete_page(app: Sphinx, page: str, source: list[str]) -> None:
         text = _with_moved_links(_OUTSIDE_PAGES[page])
     for inside, outside in _OUTSIDE_PAGES.items():
         text = text.replace(f"](../{outside})", f"]({inside}.md)")
+        text = text.replace(f"](../../{outside})", f"](../{inside}.md)")
     if page == root_doc:
         text += _sidebar(text)
     elif page == "commands":
