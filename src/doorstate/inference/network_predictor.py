@@ -118,7 +118,8 @@ class NetworkPredictor(Predictor):
             CloudContentError: a cloud that is none or not in metres, or one cloud in place of several.
         """
         started = self.clock()
-        samples = [self._clean_sample_and_gate(cloud) for cloud in _several(clouds)]
+        cleaned = [check_single_cloud(cloud) for cloud in _several(clouds)]
+        samples = [self._gate(cloud, self._sample(cloud)) for cloud in cleaned]
         accepted = [sample.points for sample in samples if sample.abstention is None]
         outputs = iter(run_by_size(self.backend, accepted))
         milliseconds = (self.clock() - started) * 1000 / max(1, len(samples))
@@ -151,19 +152,23 @@ class NetworkPredictor(Predictor):
         cloud = np.random.default_rng(0).normal(2.0, 1.0, (self.num_points, 3)).astype(np.float32)
         self.backend(prepare_cloud(cloud, CloudSpec(num_points=self.num_points)).points[None])
 
-    def _clean_sample_and_gate(self, cloud: Points) -> _Sample:
-        """Return the points for the network, and the reason if it must not be run."""
-        cloud = check_single_cloud(cloud)
+    def _sample(self, cloud: Points) -> _Sample:
         try:
-            points = self.prepare(cloud).points
+            return _Sample(self.prepare(cloud).points)
         except TooFewPointsError as error:
             return _Sample(_NO_POINTS, Abstention.from_error(error))
-        return _Sample(points, None if self.gate is None else self.gate(cloud))
+
+    def _gate(self, cloud: Points, sample: _Sample) -> _Sample:
+        if self.gate is None or sample.abstention is not None:
+            return sample
+        return _Sample(sample.points, self.gate(cloud))
 
 
 class _Sample(NamedTuple):
+    """Points for the network, and the reason if it must not be run on them."""
+
     points: Points  # (n, 3) in farthest-point order
-    abstention: Abstention | None
+    abstention: Abstention | None = None
 
 
 def _several(clouds: Sequence[Points]) -> Sequence[Points]:
