@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Squared distances between all queries and all points.
 
-Of coordinates by differences, which are exact for equal points. Of features as |p|^2 - 2 q p, a matrix product: |q|^2
-is the same for all points of a query and does not change their order.
+Coordinates take differences, which are exact for equal points. Features take |p|^2 - 2 q p, a matrix product: |q|^2 is
+the same for all points of a query and does not change their order.
 """
 
 from __future__ import annotations

@@ -2,9 +2,11 @@
 """Nearest neighbours among the blocks of points that can hold any.
 
 Points in spatial order form blocks of p points, each with a centre c and a radius r. k points near a query q bound
-the distance to its k-th neighbour by b. By the triangle inequality every point x of a block has |q - x| >= |q - c| -
-r, so the block cannot hold a neighbour if |q - c| - r > b, and is left out. A slack covers the rounding of squared
-distances.
+the distance to its k-th neighbour by b. By the triangle inequality every point x of a block has
+
+    |q - x| >= |q - c| - r,
+
+so a block with |q - c| - r > b holds no neighbour and is left out. A slack covers the rounding of squared distances.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Maximum over points of BatchNorm(W x_i), with the statistics of the batch.
 
-With z = W x and its normalised form n, the layer is y = s n + t. For s >= 0 the maximum of y is s max(n) + t; for s <
-0 the sign goes into W first, which makes the minimum a maximum. So the largest output before scaling is the largest
+With z = W x and its normalised form n, the layer is y = s n + t. If s >= 0, the maximum of y is s max(n) + t. If s < 0,
+the sign goes into W first, which makes the minimum a maximum. So the largest output before scaling is the largest
 after it.
 
 Let g[c] be the gradient of the maximum, which only winners receive. Batch normalisation spreads it over all R rows as

@@ -1,9 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Depthwise convolution over neighbours, then a linear layer over channels (PointCNN).
 
-z[c, m] = sum_k D[k, c, m] x[k, c] and y[o] = sum_cm W[o, cm] z[c, m] have nothing between them, so y[o] = sum_kc
-(sum_m W[o, cm] D[k, c, m]) x[k, c] is one product with a combined weight. With few values per neighbourhood that is
-cheaper than a pass over memory for z; with many it is more arithmetic than it saves, and the two steps remain.
+The two steps are
+
+    z[c, m] = sum_k D[k, c, m] x[k, c],   y[o] = sum_cm W[o, cm] z[c, m].
+
+Nothing comes between them, so they are one product, y[o] = sum_kc (sum_m W[o, cm] D[k, c, m]) x[k, c]. With few values
+per neighbourhood that is cheaper than a pass over memory for z. With many it is more arithmetic than it saves, and the
+two steps remain.
 """
 
 from __future__ import annotations
