@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A new user's path, timed: build wheel and sdist, install each into an empty environment, ask for states of PCDs.
+"""Build wheel and sdist, install each into an empty environment, and predict the states of PCD files; all timed.
 
-python tools/fresh_install.py     # needs the network; `make fresh-install`
-
-Torch is held to the version of requirements.lock, and nothing else is: that is what a user gets.
+`make fresh-install` runs it; it needs the network. Torch has the version of requirements.lock, all other packages the
+version that pip selects for a new user.
 """
 
 from __future__ import annotations
@@ -23,27 +22,27 @@ from doorstate.simulation.presets import PRESETS
 from doorstate.types import STATES
 
 REPOSITORY = Path(__file__).resolve().parents[1]
-PLAIN_POSE = 700  # easy for rules and networks: it is the installation that is tested
+EASY_POSE = 700  # for rules and networks: the installation is tested, not the accuracy
 
 
 def main() -> None:
-    """Build, install, ask; the environments are gone afterwards."""
+    """Build, install and predict; environments are removed afterwards."""
     with tempfile.TemporaryDirectory(prefix="doorstate-") as name:
         folder = Path(name)
         print("building wheel and sdist", flush=True)
         _timed([sys.executable, "-m", "build", "--outdir", folder, REPOSITORY])
-        _, frames = simulate_rows(PRESETS["ogurob"], seed=3, index=PLAIN_POSE)
+        _, frames = simulate_rows(PRESETS["ogurob"], seed=3, index=EASY_POSE)
         clouds = {state: folder / f"{state}.pcd" for state in STATES}
         for path, frame in zip(clouds.values(), frames, strict=True):
             write_pcd(path, frame.points)
         for pattern in ("*.whl", "*.tar.gz"):
             (distribution,) = folder.glob(pattern)
             with tempfile.TemporaryDirectory(prefix="environment-", dir=folder) as environment:
-                _ask(_install(distribution, Path(environment)), clouds)
+                _predict(_install(distribution, Path(environment)), clouds)
 
 
 def _install(distribution: Path, environment: Path) -> Path:
-    """Where the commands of the environment are."""
+    """Install a distribution and return the folder of its commands."""
     venv.create(environment, with_pip=True)
     binaries = environment / "bin"
     constraint = environment / "constraint.txt"
@@ -56,24 +55,24 @@ def _install(distribution: Path, environment: Path) -> Path:
     return binaries
 
 
-def _ask(binaries: Path, clouds: Mapping[str, Path]) -> None:
-    """Every packaged network and a rule, of a door in every state; a wrong answer ends everything."""
+def _predict(binaries: Path, clouds: Mapping[str, Path]) -> None:
+    """Predict a door in every state with a rule and every packaged network; exit on a wrong state."""
     listed, _ = _timed([binaries / "doorstate", "info", "--json"])
-    packaged = [name for each in json.loads(listed)["networks"] for name in each["packaged_weights"]]
+    packaged = [name for entry in json.loads(listed)["networks"] for name in entry["packaged_weights"]]
     for options in (["--rule", "plane_state"], *(["--network", network] for network in packaged)):
         for state, path in clouds.items():
-            said, seconds = _timed([binaries / "doorstate", "predict", path, *options, "--json"])
-            answer = json.loads(said)["state"]
+            output, seconds = _timed([binaries / "doorstate", "predict", path, *options, "--json"])
+            predicted = json.loads(output)["state"]
             print(
-                f"doorstate predict {path.name} {' '.join(options)}: {answer}, {seconds:.1f} s",
+                f"doorstate predict {path.name} {' '.join(options)}: {predicted}, {seconds:.1f} s",
                 flush=True,
             )
-            if answer != state:
-                sys.exit(f"fresh_install: {path.name} is {state}, and the answer was {answer}")
+            if predicted != state:
+                sys.exit(f"fresh_install: {path.name} is {state}, but {predicted} was predicted")
 
 
 def _timed(command: Sequence[str | Path]) -> tuple[str, float]:
-    """Standard output and seconds; its error ends everything."""
+    """Run a command and return its output and seconds; exit if it fails."""
     started = time.perf_counter()
     # Outside the repository, so that nothing of it can be imported.
     finished = subprocess.run(command, cwd=tempfile.gettempdir(), capture_output=True, text=True, check=False)
