@@ -19,7 +19,7 @@ from doorstate.types import STATES
 
 @pytest.fixture(scope="session")
 def tiny_simulation(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Five poses seen by a camera of 160 x 120 pixels; not to be written to."""
+    """Five poses with a camera of 160 x 120 pixels; read only."""
     folder = tmp_path_factory.mktemp("simulated") / "tiny"
     preset = PRESETS["ogurob"].model_copy(update={"camera": DepthCamera(width=160, height=120)})
     simulate_dataset(folder, SimulationSettings(preset=preset, seed=2, poses=5), workers=1)
@@ -28,7 +28,7 @@ def tiny_simulation(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def prepared(tmp_path: Path) -> Path:
-    """Eleven random clouds of 40 points, whose states go round."""
+    """Eleven random clouds of 40 points with alternating states."""
     folder = tmp_path / "prepared"
     folder.mkdir()
     np.save(folder / CLOUDS, np.random.default_rng(0).uniform(1, 4, (11, 40, 3)).astype(np.float32))

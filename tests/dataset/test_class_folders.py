@@ -63,7 +63,7 @@ def touch(root: Path, *names: str) -> Path:
     return root
 
 
-def test_the_nearest_folder_that_names_a_state_decides(tmp_path: Path) -> None:
+def test_the_nearest_folder_with_a_state_decides(tmp_path: Path) -> None:
     root = touch(
         tmp_path / "doors",
         "Train/Closed/1.pcd",

@@ -33,7 +33,7 @@ POSE = CameraPose.from_degrees((0.1, 2.5, HEIGHT_M), -90, 0, 90)
 
 
 def recorded(opening_deg: float) -> tuple[np.ndarray, np.ndarray]:
-    """(480, 640) depth in metres, NaN beyond 10 m, and parts, as the turned camera sees a door."""
+    """(480, 640) depth in metres, NaN beyond 10 m, and parts, of a door in front of the turned camera."""
     frame = render(
         scene_boxes(Scene(door=Door(), has_ceiling=False), Opening(angle_deg=opening_deg)), POSE, CAMERA
     )
@@ -64,9 +64,7 @@ def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize("opening_deg", [1, 88])
-def test_a_door_seen_by_the_turned_camera_stands_upright_at_its_distance(
-    opening_deg: float, tmp_path: Path
-) -> None:
+def test_a_door_of_the_turned_camera_is_upright_at_its_distance(opening_deg: float, tmp_path: Path) -> None:
     depth_m, part = recorded(opening_deg)
     points = read_deepdoors2(write(tmp_path / "door.png", depth_m), ReadOptions())
     assert points.shape == (640, 480, 3)
@@ -90,7 +88,7 @@ def test_a_door_seen_by_the_turned_camera_stands_upright_at_its_distance(
         assert reach_m == pytest.approx(Door().opening_width_m, abs=0.1)
 
 
-def test_every_pixel_is_the_turned_cameras_own_point(tmp_path: Path) -> None:
+def test_every_pixel_equals_the_point_of_the_turned_camera(tmp_path: Path) -> None:
     depth_m, _ = recorded(40)
     rounded_m = np.rint(depth_m / STEP_M) * STEP_M
     ours = read_deepdoors2(write(tmp_path / "door.png", depth_m), ReadOptions())
@@ -128,7 +126,7 @@ def test_other_intrinsics_replace_the_published_ones(tmp_path: Path) -> None:
         read_deepdoors2(path, ReadOptions(intrinsics=Intrinsics(800, 600, 400, 400, 400, 300)))
 
 
-def test_grey_stored_as_colour_is_read_and_colour_is_not(tmp_path: Path) -> None:
+def test_grey_images_stored_as_colour_are_read_and_colour_images_refused(tmp_path: Path) -> None:
     grey = write(tmp_path / "grey.png", recorded(1)[0])
     as_colour = write(tmp_path / "colour.png", recorded(1)[0], "RGB")
     np.testing.assert_array_equal(

@@ -52,7 +52,7 @@ def test_every_sample_has_a_role_and_is_tested_once(protocol: str) -> None:
     assert len(tested) == len(ALL)
 
 
-def test_the_papers_folds_are_70_10_20_of_the_whole_and_of_every_stratum() -> None:
+def test_the_folds_of_the_paper_are_70_10_20_in_total_and_in_every_stratum() -> None:
     for roles in draw_splits(ALL, "paper", 0):
         counts = Counter(roles.values())
         # 4059 samples make tenths of 405 or 406.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A prepared folder opens as it was written, and a damaged one says what is wrong with it."""
+"""Prepared folders open as written, and damaged ones are refused."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from doorstate.errors import DatasetError
 from doorstate.types import STATES
 
 
-def test_rows_clouds_and_labels_are_in_one_order(prepared: Path) -> None:
+def test_rows_clouds_and_labels_have_the_same_order(prepared: Path) -> None:
     dataset = open_dataset(prepared)
     assert (len(dataset), dataset.num_points) == (11, 40)
     assert [STATES[label] for label in dataset.labels] == [row["state"] for row in dataset.rows]
@@ -26,7 +26,7 @@ def test_rows_clouds_and_labels_are_in_one_order(prepared: Path) -> None:
     assert dataset.image(0) is None
 
 
-def test_a_cloud_is_a_copy_that_may_be_changed(prepared: Path) -> None:
+def test_a_cloud_is_a_copy(prepared: Path) -> None:
     dataset = open_dataset(prepared)
     dataset.cloud(0)[:] = 0
     assert dataset.cloud(0).min() >= 1

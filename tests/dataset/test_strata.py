@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Bands and regions: every edge, both sides of the door alike."""
+"""Bands and regions at their edges, and symmetry of both sides of the door."""
 
 from __future__ import annotations
 
@@ -51,13 +51,13 @@ def test_edges_of_the_distance_bands(distance_m: float, name: str) -> None:
         (math.nan, OUTSIDE),
     ],
 )
-def test_edges_of_the_regions_go_to_the_side_of_the_walls_normal(angle_deg: float, name: str) -> None:
+def test_edges_of_the_regions_belong_to_the_side_of_the_wall_normal(angle_deg: float, name: str) -> None:
     assert region(angle_deg) == name
 
 
 @given(st.floats(0, 180) | st.sampled_from([0.0, 30.0, 60.0, 90.0, 120.0, 150.0, 180.0]))
 @settings(deadline=None, max_examples=100)
-def test_left_and_right_of_the_door_are_alike(angle_deg: float) -> None:
+def test_regions_are_symmetric(angle_deg: float) -> None:
     mirrored = 180 - angle_deg
     if 180 - mirrored == angle_deg:  # exact in floating point
         assert region(mirrored) == OPPOSITE[region(angle_deg)]
@@ -65,7 +65,7 @@ def test_left_and_right_of_the_door_are_alike(angle_deg: float) -> None:
 
 @given(x_m=st.floats(-10, 10), y_m=st.floats(0.01, 10))
 @settings(deadline=None, max_examples=100)
-def test_polar_coordinates_turn_back(x_m: float, y_m: float) -> None:
+def test_polar_coordinates_invert(x_m: float, y_m: float) -> None:
     distance_m, angle_deg = polar(x_m, y_m)
     assert distance_m * math.cos(math.radians(angle_deg)) == pytest.approx(x_m, abs=1e-7)
     assert distance_m * math.sin(math.radians(angle_deg)) == pytest.approx(y_m, abs=1e-7)

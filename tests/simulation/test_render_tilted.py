@@ -62,7 +62,7 @@ def test_a_positive_roll_turns_the_camera_clockwise() -> None:
     assert columns.mean() == pytest.approx(CAMERA.cx)
 
 
-def test_no_roll_leaves_every_bit_of_a_pose() -> None:
+def test_zero_roll_keeps_the_rotation_bit_for_bit() -> None:
     pose = CameraPose(1.0, 2.0, 1.0, 0.3, 0.2)
     assert pose._replace(roll_rad=0.0).rotation().tobytes() == pose.rotation().tobytes()
     nearly = pose._replace(roll_rad=1e-300).rotation()

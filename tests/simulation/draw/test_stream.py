@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stream of a scene: the same for the same key, independent for any other."""
+"""Random streams: the same for the same key, independent for different keys."""
 
 from __future__ import annotations
 
