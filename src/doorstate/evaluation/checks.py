@@ -75,7 +75,7 @@ def _check_roles(run: pd.DataFrame, roles: Mapping[str, Role], fold: int, path: 
     if len(other):
         row = other.iloc[0]
         raise RunError(
-            f"sample {row['sample_id']} is no {row['role']} sample of fold {fold} in the splits",
+            f"sample {row['sample_id']} is not a {row['role']} sample of fold {fold} in the splits",
             path=path,
             field="sample_id",
         )

@@ -36,7 +36,7 @@ def read_detections(path: Path) -> Detections:
             sample, shapes = _LINE.validate_python((record["sample_id"], record["detections"]))
         except (ValueError, KeyError, TypeError, ValidationError) as error:
             raise RunError(
-                f"line {number} is no record of detections", path=path, hint="run this rule again"
+                f"line {number} is not a record of detections", path=path, hint="run this rule again"
             ) from error
         detections[sample] = tuple(
             Detection(name, np.array(points).reshape(-1, 3)) for name, points in shapes

@@ -122,7 +122,7 @@ def _shapes(results: Results, sample_id: str, methods: Iterable[str]) -> dict[st
 
 
 def _facts(row: pd.Series[Any]) -> list[str]:
-    """Word what the manifest records of a sample; missing columns are passed over."""
+    """Return facts of a sample in words; missing columns are left out."""
     fields = row.dropna()
     facts = []
     if "opening_angle_deg" in fields:

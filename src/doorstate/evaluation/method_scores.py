@@ -3,13 +3,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pandas as pd
 
 from doorstate.evaluation.comparison import Results
-from doorstate.evaluation.intervals import F1Intervals, bootstrap_f1, bounds, wilson_interval
+from doorstate.evaluation.intervals import F1Intervals, Interval, bootstrap_f1, bounds, wilson_interval
 from doorstate.evaluation.manifest import text_column
-from doorstate.evaluation.metrics import accuracy, confusion, macro_f1, mean_and_deviation, scores
+from doorstate.evaluation.metrics import Floats, confusion, macro_f1, mean_and_deviation, ratio, scores
 from doorstate.types import ABSTAINED, PREDICTED_LABELS, STATES
 
 MACRO = "macro"
@@ -55,32 +57,23 @@ def summarize_methods(results: Results) -> pd.DataFrame:
     """Summarize each method in a row.
 
     Returns:
-        Columns method, samples, errors, accuracy, precision, recall, f1 (macro), with `_low` and `_high` of accuracy
-        (Wilson) and F1 (bootstrap), and f1_mean and f1_deviation over folds.
+        Columns method, samples, errors, accuracy with `_low` and `_high` (Wilson), and those of `score_states` for the
+        mean over the states.
     """
-    folds = fold_scores(results)
     rows = []
     for method in results.methods:
-        counts = confusion(results.tested_by(method))
-        total, correct = int(counts.sum()), int(np.trace(counts))
-        macro, interval = scores(counts).macro, f1_intervals(results, method).macro
-        mean, deviation = mean_and_deviation(folds.loc[folds["method"] == method, "f1"].tolist())
+        correct = results.tested_by(method)["correct"]
         rows.append(
             {
                 "method": method,
-                "samples": total,
-                "errors": total - correct,
-                "accuracy": accuracy(counts),
-                **bounds("accuracy", wilson_interval(correct, total)),
-                "precision": float(macro.precision),
-                "recall": float(macro.recall),
-                "f1": float(macro.f1),
-                **bounds("f1", interval),
-                "f1_mean": mean,
-                "f1_deviation": deviation,
+                "samples": len(correct),
+                "errors": int((~correct).sum()),
+                "accuracy": float(ratio(correct.sum(), len(correct))),
+                **bounds("accuracy", wilson_interval(int(correct.sum()), len(correct))),
             }
         )
-    return pd.DataFrame(rows)
+    states = score_states(results)
+    return pd.DataFrame(rows).merge(states[states["state"] == MACRO].drop(columns="state"), on="method")
 
 
 def score_states(results: Results) -> pd.DataFrame:
@@ -93,39 +86,33 @@ def score_states(results: Results) -> pd.DataFrame:
     rows = []
     for method in results.methods:
         tested = results.tested_by(method)
-        counts = confusion(tested)
-        score, intervals = scores(counts), f1_intervals(results, method)
-        folds = scores(
+        counts, intervals = confusion(tested), f1_intervals(results, method)
+        by_fold = scores(
             np.stack([confusion(tested[tested["fold"] == run.fold]) for run in results.runs_of(method)])
         )
+        score, hits = scores(counts), np.diagonal(counts)
         for index, state in enumerate(STATES):
-            hits = int(counts[index, index])
-            mean, deviation = mean_and_deviation(folds.f1[:, index].tolist())
+            predicted_samples, state_samples = counts[:, index].sum(), counts[index].sum()
             rows.append(
-                {
-                    "method": method,
-                    "state": state,
-                    "precision": score.precision[index],
-                    **bounds("precision", wilson_interval(hits, int(counts[:, index].sum()))),
-                    "recall": score.recall[index],
-                    **bounds("recall", wilson_interval(hits, int(counts[index].sum()))),
-                    "f1": score.f1[index],
-                    **bounds("f1", intervals.per_state[index]),
-                    "f1_mean": mean,
-                    "f1_deviation": deviation,
-                }
+                {"method": method, "state": state}
+                | _scores_row(score.precision[index], score.recall[index], score.f1[index])
+                | bounds("precision", wilson_interval(hits[index], predicted_samples))
+                | bounds("recall", wilson_interval(hits[index], state_samples))
+                | _f1_row(intervals.per_state[index], by_fold.f1[:, index])
             )
-        mean, deviation = mean_and_deviation(folds.macro.f1.tolist())
+        macro = score.macro
         rows.append(
-            {
-                "method": method,
-                "state": MACRO,
-                "precision": float(score.macro.precision),
-                "recall": float(score.macro.recall),
-                "f1": float(score.macro.f1),
-                **bounds("f1", intervals.macro),
-                "f1_mean": mean,
-                "f1_deviation": deviation,
-            }
+            {"method": method, "state": MACRO}
+            | _scores_row(macro.precision, macro.recall, macro.f1)
+            | _f1_row(intervals.macro, by_fold.macro.f1)
         )
     return pd.DataFrame(rows)
+
+
+def _scores_row(precision: Floats, recall: Floats, f1: Floats) -> dict[str, Any]:
+    return {"precision": float(precision), "recall": float(recall), "f1": float(f1)}
+
+
+def _f1_row(interval: Interval, by_fold: Floats) -> dict[str, Any]:
+    mean, deviation = mean_and_deviation(by_fold.tolist())
+    return {**bounds("f1", interval), "f1_mean": mean, "f1_deviation": deviation}

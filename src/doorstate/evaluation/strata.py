@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from doorstate.dataset.strata import BANDS, REGIONS
 from doorstate.evaluation.comparison import Results
 from doorstate.evaluation.manifest import text_column
-from doorstate.evaluation.metrics import confusion_cells, label_codes, ratio, scores
+from doorstate.evaluation.metrics import confusion_cells, label_codes, scores
 from doorstate.types import NO_DOOR, PREDICTED_LABELS, STATES, Indices
 
 ALL = "all"
@@ -48,31 +48,24 @@ def score_strata(results: Results, state: str) -> pd.DataFrame:
         Columns method, region, band, hits, state_samples, predicted_samples, recall, precision, f1.
     """
     index = STATES.index(state)
-    rows = []
+    parts = []
     for method in results.methods:
         tested = results.tested_by(method)
         cells = _with_sums(_count(tested, confusion_cells(tested), len(STATES) * len(PREDICTED_LABELS)))
-        counts = cells.reshape(*cells.shape[:2], len(STATES), len(PREDICTED_LABELS))  # (6, 5, 3, 4)
-        f1 = scores(counts).f1[..., index]
-        hits = counts[..., index, index]
-        state_samples, predicted_samples = counts[..., index, :].sum(-1), counts[..., :, index].sum(-1)
-        recall, precision = ratio(hits, state_samples), ratio(hits, predicted_samples)
-        for r, region in enumerate(STRATUM_REGIONS):
-            for b, band in enumerate(STRATUM_BANDS):
-                rows.append(
-                    {
-                        "method": method,
-                        "region": region,
-                        "band": band,
-                        "hits": hits[r, b],
-                        "state_samples": state_samples[r, b],
-                        "predicted_samples": predicted_samples[r, b],
-                        "recall": recall[r, b],
-                        "precision": precision[r, b],
-                        "f1": f1[r, b],
-                    }
-                )
-    return pd.DataFrame(rows)
+        counts = cells.reshape(-1, len(STATES), len(PREDICTED_LABELS))  # (30, 3, 4)
+        score = scores(counts)
+        columns = {
+            "region": np.repeat(STRATUM_REGIONS, len(STRATUM_BANDS)),
+            "band": np.tile(STRATUM_BANDS, len(STRATUM_REGIONS)),
+            "hits": counts[:, index, index],
+            "state_samples": counts[:, index, :].sum(axis=-1),
+            "predicted_samples": counts[:, :, index].sum(axis=-1),
+            "recall": score.recall[:, index],
+            "precision": score.precision[:, index],
+            "f1": score.f1[:, index],
+        }
+        parts.append(pd.DataFrame({"method": method, **columns}))
+    return pd.concat(parts, ignore_index=True)
 
 
 def _in_strata(frame: pd.DataFrame) -> pd.Series[bool]:
