@@ -207,8 +207,9 @@ def test_evaluate_takes_the_layout(root: Path, run: Run) -> None:
     )
     assert (code, err) == (0, "")
     metrics = json.loads(out)
-    result = metrics["methods"]["plane_state"]
     assert metrics["states"] == {"closed": 1, "semi_open": 1, "open": 1}
-    assert result["by"]["split"]["test"]["frames"] == 3
+    (stratum,) = (row for row in metrics["strata"]["split"] if row["method"] == "plane_state")
+    assert (stratum["value"], stratum["frames"]) == ("test", 3)
     # A rule that measures angles needs doors that are upright and in true proportion.
-    assert result["all"]["right"] >= 2
+    (score,) = (row for row in metrics["scores"] if row["method"] == "plane_state")
+    assert score["correct"] >= 2
