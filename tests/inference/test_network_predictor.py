@@ -86,7 +86,9 @@ def test_a_frame_without_data_is_unknown_and_does_not_change_its_batch(predictor
     for variant in (predictor, ungated):
         first, empty, few, last = variant.batch([cloud, blank, cloud[:127], cloud])
         assert first.state is not None
-        assert first.probabilities == last.probabilities == variant(cloud).probabilities
+        # The sums of a batch may be ordered differently from those of one cloud.
+        assert first.probabilities == pytest.approx(last.probabilities, abs=1e-6)
+        assert first.probabilities == pytest.approx(variant(cloud).probabilities, abs=1e-6)
         assert (empty.state, empty.num_points, few.state, few.num_points) == (None, 0, None, 0)
         for prediction in (empty, few):
             assert prediction.abstention is not None
