@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What can be said of the ROS 2 package without ROS: its files agree with one another, with the node and its README."""
+"""ROS 2 package without ROS: its files agree with each other, with the node and with its README."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def test_name_version_and_licence_are_the_same_everywhere(setup_arguments: dict[
     assert f"/lib/{PACKAGE.name}" in (PACKAGE / "setup.cfg").read_text(encoding="utf-8")
 
 
-def test_everything_is_installed_where_ros_looks_for_it(setup_arguments: dict[str, Any]) -> None:
+def test_files_are_installed_where_ros_searches_them(setup_arguments: dict[str, Any]) -> None:
     installed = {
         f"{folder}/{Path(file).name}" for folder, files in setup_arguments["data_files"] for file in files
     }
@@ -89,7 +89,7 @@ def test_the_entry_point_is_a_function_of_the_node(setup_arguments: dict[str, An
     assert f"ros2 run doorstate_ros {executable}" in README
 
 
-def test_what_is_imported_is_declared() -> None:
+def test_imports_are_declared() -> None:
     used = imported(NODE) | imported(LAUNCH.read_text(encoding="utf-8"))
     declared = {element.text for element in MANIFEST.iter("exec_depend")}
     assert used - set(sys.stdlib_module_names) - {"doorstate"} == declared
@@ -97,14 +97,14 @@ def test_what_is_imported_is_declared() -> None:
 
 def test_the_parameter_file_holds_every_parameter_with_its_default() -> None:
     content = yaml.safe_load((PACKAGE / "config" / "doorstate.yaml").read_text(encoding="utf-8"))
-    given = content["/**"]["ros__parameters"]
-    assert list(given) == list(WatchSettings.model_fields)
-    assert parse_settings(given) == WatchSettings()
-    for name, value in given.items():  # a double that is written as an integer would be one to ROS
+    parameters = content["/**"]["ros__parameters"]
+    assert list(parameters) == list(WatchSettings.model_fields)
+    assert parse_settings(parameters) == WatchSettings()
+    for name, value in parameters.items():  # ROS takes a double without a point for an integer
         assert type(value) is type(WatchSettings.model_fields[name].default), name
 
 
-def test_the_readme_lists_every_parameter_with_its_default_and_every_value() -> None:
+def test_the_readme_lists_every_parameter_default_and_value() -> None:
     listed = dict(re.findall(r"^\| `(\w+)` \| `([^`]*)` \|", README, flags=re.MULTILINE))
     defaults = {name: str(field.default) for name, field in WatchSettings.model_fields.items()}
     shown = {
@@ -142,7 +142,7 @@ def test_links_of_the_readme_exist() -> None:
     assert [target for target in targets if "://" not in target and not (ROS2 / target).exists()] == []
 
 
-def test_the_profile_for_large_clouds_holds_one_in_shared_memory() -> None:
+def test_the_profile_for_large_clouds_has_enough_shared_memory() -> None:
     root = ElementTree.parse(PACKAGE / "config" / "fastdds_large_clouds.xml").getroot()
     text = {element.tag.partition("}")[2]: element.text for element in root.iter()}
     largest_cloud = 640 * 480 * 32  # bytes; x, y, z and colour as drivers pad them
