@@ -163,3 +163,21 @@ def join_manifest(predictions: pd.DataFrame, manifest: pd.DataFrame) -> pd.DataF
     truth = manifest.drop(columns=[name for name in manifest if name in renamed])
     joined = renamed.join(truth, on="sample_id")
     return joined.assign(correct=joined["predicted"] == joined["state"])
+
+
+def order_predictions(predictions: pd.DataFrame, config: ComparisonConfig) -> pd.DataFrame:
+    """Sort rows by method, fold and role, samples as they were, and put the columns that all tables have first."""
+    rank = pd.DataFrame(
+        {
+            "method": predictions["method"].map({name: rank for rank, name in enumerate(config.methods)}),
+            "fold": predictions["fold"],
+            "role": predictions["role"],
+        }
+    )
+    rows = predictions.loc[rank.sort_values(["method", "fold", "role"], kind="stable").index]
+    first = (*KEY_COLUMNS, *RULE_COLUMNS)
+    columns = [*first, *(name for name in predictions if name not in first)]
+    text = {name: "str" for name in columns if name in TEXT_COLUMNS}
+    return (
+        rows.reindex(columns=columns).astype({**text, "opening_angle_deg": "float64"}).reset_index(drop=True)
+    )

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Load the results of a comparison from its folder or from its published form, check them, and join several."""
+"""Load the results of a comparison from its folder or from its published form, and check them."""
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -16,14 +15,8 @@ from doorstate.dataset.store import manifest_path
 from doorstate.errors import DatasetError, RunError, first_validation_error
 from doorstate.evaluation import comparison_folder, published
 from doorstate.evaluation.checks import check_predictions
-from doorstate.evaluation.comparison import (
-    KEY_COLUMNS,
-    RULE_COLUMNS,
-    TEXT_COLUMNS,
-    ComparisonConfig,
-    Results,
-    RunRecord,
-)
+from doorstate.evaluation.comparison import ComparisonConfig, Results, RunRecord, order_predictions
+from doorstate.evaluation.join import join_results
 from doorstate.evaluation.manifest import read_manifest
 from doorstate.evaluation.published import save_results
 from doorstate.rules.base import Detection
@@ -61,54 +54,6 @@ def load_results(folder: Path, dataset: Path | None = None, folds: int | None = 
     dataset_folder = dataset or _find_dataset(folder, config.dataset, is_published)
     load = _load_published if is_published else _load_runs
     return load(folder, config, dataset_folder, tuple(splits))
-
-
-def join_results(parts: Sequence[Results]) -> Results:
-    """Put the methods of comparisons on the same samples side by side, in the order given.
-
-    Folds that one of them does not have are left out.
-
-    Raises:
-        RunError: they differ in protocol, points or splits, or a method is in two of them.
-    """
-    folds = min(part.config.folds for part in parts)
-    first = parts[0]
-    for part in parts[1:]:
-        for name in ("protocol", "num_points"):
-            if getattr(part.config, name) != getattr(first.config, name):
-                raise RunError(
-                    f"{part.config.name} has another {name} than {first.config.name}",
-                    field=name,
-                    hint="join comparisons of one kind only",
-                )
-        if part.splits[:folds] != first.splits[:folds]:
-            raise RunError(
-                f"{part.config.name} has other splits than {first.config.name}",
-                hint="join comparisons of one kind only",
-            )
-    counts = Counter(method for part in parts for method in part.config.methods)
-    if repeated := [method for method, count in counts.items() if count > 1]:
-        raise RunError(f"{repeated[0]} is in two of these comparisons", hint="leave one out")
-    config = first.config.model_copy(
-        update={
-            "name": " + ".join(part.config.name for part in parts),
-            "folds": folds,
-            "networks": tuple(name for part in parts for name in part.config.networks),
-            "rules": tuple(name for part in parts for name in part.config.rules),
-            "recipe": {key: value for part in parts for key, value in part.config.recipe.items()},
-            "runs": {key: value for part in parts for key, value in part.config.runs.items()},
-        }
-    )
-    predictions = pd.concat([part.predictions for part in parts], ignore_index=True)
-    return Results(
-        config,
-        first.dataset_folder,
-        first.manifest,
-        first.splits,
-        _ordered(predictions[predictions["fold"] < folds], config),
-        tuple(run for part in parts for run in part.runs if run.fold < folds),
-        {method: shapes for part in parts for method, shapes in part.detections.items()},
-    )
 
 
 def _is_published(folder: Path) -> bool:
@@ -152,7 +97,7 @@ def _load_runs(
         dataset_folder,
         manifest,
         splits,
-        _ordered(predictions, config),
+        order_predictions(predictions, config),
         tuple(each.record for each in contents),
         detections,
     )
@@ -208,26 +153,8 @@ def _checked(
         dataset_folder,
         read_manifest(dataset_folder),
         splits,
-        _ordered(predictions[predictions["fold"] < config.folds], config),
+        order_predictions(predictions[predictions["fold"] < config.folds], config),
         tuple(run for run in runs if run.fold < config.folds),
     )
     check_predictions(results, lambda method, fold: path)
     return results
-
-
-def _ordered(predictions: pd.DataFrame, config: ComparisonConfig) -> pd.DataFrame:
-    """Sort rows by method, fold and role, samples as they were, and put the columns that all tables have first."""
-    rank = pd.DataFrame(
-        {
-            "method": predictions["method"].map({name: rank for rank, name in enumerate(config.methods)}),
-            "fold": predictions["fold"],
-            "role": predictions["role"],
-        }
-    )
-    rows = predictions.loc[rank.sort_values(["method", "fold", "role"], kind="stable").index]
-    first = (*KEY_COLUMNS, *RULE_COLUMNS)
-    columns = [*first, *(name for name in predictions if name not in first)]
-    text = {name: "str" for name in columns if name in TEXT_COLUMNS}
-    return (
-        rows.reindex(columns=columns).astype({**text, "opening_angle_deg": "float64"}).reset_index(drop=True)
-    )
