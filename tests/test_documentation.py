@@ -19,6 +19,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from doorstate.io.pcd import write_pcd
 from doorstate.io.readers import read_cloud
@@ -58,7 +59,8 @@ def commands(block: str) -> list[list[str]]:
 def sample_files(simulated_folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """One open door in every form that the pages name, and a recording of twenty frames of it."""
     folder = tmp_path_factory.mktemp("documentation")
-    cloud = read_cloud(sorted((simulated_folder / "pcd" / "open").glob("*.pcd"))[0])[::2, ::2]
+    image = read_cloud(sorted((simulated_folder / "pcd" / "open").glob("*.pcd"))[0])  # (480, 640, 3)
+    cloud = image[::2, ::2]
     flat = cloud.reshape(-1, 3)
     write_pcd(folder / "cloud.pcd", cloud)
     for name in ("recording", "recordings"):
@@ -71,12 +73,8 @@ def sample_files(simulated_folder: Path, tmp_path_factory: pytest.TempPathFactor
     np.save(folder / "cloud.npy", cloud)
     np.save(folder / "optical.npy", np.stack((-cloud[..., 1], -cloud[..., 2], cloud[..., 0]), -1) * 1000)
     np.savetxt(folder / "cloud.csv", flat, delimiter=",", header="x,y,z", comments="")
-    from PIL import Image
-
-    depth_mm = np.nan_to_num(read_cloud(folder / "cloud.pcd")[..., 0] * 1000).astype(np.uint16)
-    Image.fromarray(depth_mm).save(folder / "depth.png")
-    camera = DepthCamera(width=depth_mm.shape[1], height=depth_mm.shape[0])
-    (folder / "camera_info.yaml").write_text(json.dumps(vars(camera.intrinsics())))
+    Image.fromarray(np.nan_to_num(image[..., 0] * 1000).astype(np.uint16)).save(folder / "depth.png")
+    (folder / "camera_info.yaml").write_text(json.dumps(vars(DepthCamera().intrinsics())))
     for name in ("examples", "paper"):
         (folder / name).symlink_to(ROOT / name)
     return folder
