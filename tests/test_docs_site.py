@@ -69,13 +69,3 @@ def test_the_reference_has_signatures_and_every_command(site: Path) -> None:
     names = re.findall(r"^  ([a-z]+)  ", helped.partition("Commands:")[2], flags=re.MULTILINE)
     assert len(names) > 9
     assert [name for name in names if f"Usage: doorstate {name} " not in commands] == []
-
-
-def test_links_of_the_markdown_exist_where_github_looks_for_them() -> None:
-    missing = [
-        f"{page.relative_to(ROOT)}: {address}"
-        for page in (*DOCS.rglob("*.md"), ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md")
-        for address in re.findall(r"\]\(([^)\s#]+)[^)]*\)", page.read_text(encoding="utf-8"))
-        if "://" not in address and not (page.parent / address).exists()
-    ]
-    assert missing == []

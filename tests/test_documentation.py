@@ -14,23 +14,25 @@ import shlex
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 from PIL import Image
+from sklearn.metrics import f1_score
 
+from doorstate.evaluation.predictions import load_results
 from doorstate.io.pcd import write_pcd
 from doorstate.io.readers import read_cloud
 from doorstate.simulation.camera import DepthCamera
+from doorstate.types import STATES
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = (
     "README.md",
     "docs/tutorial.md",
     "docs/inputs.md",
-    "docs/bags.md",
     "docs/deployment.md",
     "docs/onnx.md",
     "docs/view.md",
@@ -38,21 +40,47 @@ PAGES = (
 SMALL = {
     "simulate": "--poses 12 --workers 1",
     "prepare": "--points 128 --workers 1",
+    "export": "--clouds 6",
     "compare": "--folds 1 --points 128 --epochs 1 --set batch_size=8 --set precision=fp32",
 }
 PROGRAMS = {"python": sys.executable, "doorstate": str(Path(sys.executable).with_name("doorstate"))}
 SETUP = ("pip", "make", "git")  # checked, not run
 
 
-def blocks(page: str) -> Iterator[tuple[str, str]]:
-    """Language and text of the fenced blocks that are meant to run."""
+class Block(NamedTuple):
+    """A fenced block that runs, and the output that the page shows below it."""
+
+    language: str
+    text: str
+    output: str
+
+
+def blocks(page: str) -> list[Block]:
     text = (ROOT / page).read_text(encoding="utf-8")
-    yield from re.findall(r"^```(bash|python)\n(.*?)^```", text, flags=re.DOTALL | re.MULTILINE)
+    fenced = r"^```(bash|python)\n(.*?)^```(?:\n\n```text\n(.*?)^```)?"
+    return [Block(*match) for match in re.findall(fenced, text, flags=re.DOTALL | re.MULTILINE)]
 
 
-def commands(block: str) -> list[list[str]]:
-    lines = block.replace("\\\n", " ").splitlines()
+def commands(block: Block) -> list[list[str]]:
+    lines = block.text.replace("\\\n", " ").splitlines()
     return [words for line in lines if (words := shlex.split(line, comments=True))]
+
+
+def runs(block: Block) -> list[list[str]]:
+    """Return the command lines that run a block here."""
+    if block.language == "python":
+        return [[sys.executable, "-c", block.text]]
+    return [
+        [PROGRAMS[program], *arguments, *shlex.split(SMALL.get(arguments[0], ""))]
+        for program, *arguments in commands(block)
+        if program not in SETUP
+    ]
+
+
+def comparable(output: str) -> list[list[str]]:
+    """Return the cells of table rows without the last one (milliseconds), and the words of other lines."""
+    lines = [line for line in output.splitlines() if line.strip(" ┏┓┳━┡╇┩└┴┘─")]
+    return [line.split("│")[:-2] if "│" in line else line.rstrip(" ms┃").split() for line in lines]
 
 
 @pytest.fixture(scope="module")
@@ -87,22 +115,47 @@ def test_every_block_runs(page: str, sample_files: Path, tmp_path: Path) -> None
     shutil.copytree(sample_files, folder, symlinks=True)
     environment = os.environ | {"OMP_NUM_THREADS": "1"}
     count = 0
-    for language, block in blocks(page):
-        if language == "python":
-            runs = [[sys.executable, "-c", block]]
-        else:
-            words_of_commands = [words for words in commands(block) if words[0] not in SETUP]
-            runs = [
-                [PROGRAMS[program], *arguments, *shlex.split(SMALL.get(arguments[0], ""))]
-                for program, *arguments in words_of_commands
-            ]
-        for run in runs:
+    for block in blocks(page):
+        for run in runs(block):
             finished = subprocess.run(
                 run, cwd=folder, env=environment, capture_output=True, text=True, check=False, timeout=300
             )
             assert finished.returncode == 0, f"{page}: {' '.join(run)}\n{finished.stderr}"
             count += 1
+        if block.output:
+            assert comparable(finished.stdout) == comparable(block.output), f"{page}: {block.text}"
     assert count
+
+
+def macro_f1_and_errors(experiment: str) -> dict[str, tuple[str, str]]:
+    """Return both numbers of every method, from the committed predictions."""
+    results = load_results(ROOT / "results" / experiment)
+    numbers = {}
+    for method in results.methods:
+        tested = results.tested_by(method)
+        macro_f1 = f1_score(tested["state"], tested["predicted"], labels=list(STATES), average="macro")
+        numbers[method] = (f"{macro_f1:.4f}", str(len(tested) - int(tested["correct"].sum())))
+    return numbers
+
+
+def test_the_results_of_the_readme_follow_from_the_predictions() -> None:
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    row = r"^\| (\S+) \| ([\d.]+) \| (\d+) \| ([\d.]+) \| (\d+) \|$"
+    table = {
+        name.lower().replace("++", "2"): numbers
+        for name, *numbers in re.findall(row, readme, flags=re.MULTILINE)
+    }
+    paper, by_pose = macro_f1_and_errors("paper"), macro_f1_and_errors("by-pose")
+    assert {name: tuple(numbers[:3]) for name, numbers in table.items()} == {
+        name: (*numbers, by_pose[name][0]) for name, numbers in paper.items()
+    }
+    (errors,) = re.findall(r"`wall_leaf_angle`, has (\d+) errors", readme)
+    assert errors == macro_f1_and_errors("related")["wall_leaf_angle"][1]
+    latency = (ROOT / "docs/benchmarks/latency.md").read_text(encoding="utf-8")
+    for name, (*_, milliseconds) in table.items():
+        total = rf"^\| {name} \| torch \| 4096 \| 2 \|.* ([\d.]+) \([\d.]+\) \|$"
+        (measured,) = re.findall(total, latency, flags=re.MULTILINE)
+        assert abs(float(measured) - int(milliseconds)) <= 0.5, name
 
 
 def test_make_targets_of_the_pages_exist() -> None:
@@ -111,8 +164,8 @@ def test_make_targets_of_the_pages_exist() -> None:
     used = {
         words[1]
         for page in (*PAGES, "CONTRIBUTING.md")
-        for language, block in blocks(page)
-        if language == "bash"
+        for block in blocks(page)
+        if block.language == "bash"
         for words in commands(block)
         if words[0] == "make"
     }
