@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One target for each format and message type; each is a hypothesis test, which atheris drives as well.
+"""All targets by name; those of formats and message types are defined here. atheris drives the same tests.
 
 Every input must either be read or be refused with one of the package's own errors in one line. No other exception, no
 warning, at most a second of processor time, and no prepared cloud from fewer measured points than a network needs.
@@ -8,20 +8,17 @@ warning, at most a second of processor time, and no prepared cloud from fewer me
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
-from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from doorstate.clouds.preparation import MIN_POINTS, CloudSpec, prepare_cloud
-from doorstate.errors import MAX_MESSAGE_LENGTH, DoorstateError
+from doorstate.errors import DoorstateError
 from doorstate.io.bags import open_bag
 from doorstate.io.body_frame import points_from_depth
 from doorstate.io.camera import Pinhole, read_intrinsics
@@ -29,7 +26,8 @@ from doorstate.io.messages import points_from_message
 from doorstate.io.options import ReadOptions
 from doorstate.io.readers import BAG_SUFFIXES, CLOUD_SUFFIXES, parse_cloud, read_cloud
 from doorstate.types import Points
-from tests.fuzz import examples
+from tests.fuzz import examples, predictions, settings_files
+from tests.fuzz.harness import Target, check_line, fuzz_target, outcome_of
 from tests.fuzz.strategies import (
     OPTIONS,
     YAML_TOKENS,
@@ -40,12 +38,10 @@ from tests.fuzz.strategies import (
     png_files,
 )
 
-LIMIT_S = 1.0  # of processor time
 _SPEC = CloudSpec(num_points=MIN_POINTS)
 _SCRATCH = TemporaryDirectory()
 _FOLDER = Path(_SCRATCH.name)
 _STEMS = ("cloud", b"\xff\xfe".decode(errors="surrogateescape"), "é", "a b\tc", "-", "%s{}")
-Target = Callable[[], None]
 
 
 def check(read: Callable[[], Points]) -> str:
@@ -54,8 +50,8 @@ def check(read: Callable[[], Points]) -> str:
     Raises:
         AssertionError: neither, or too slowly.
     """
-    started = time.process_time()
-    try:
+
+    def prepare() -> str:
         points = read()
         assert points.dtype == np.float32
         assert points.ndim in (2, 3)
@@ -63,31 +59,9 @@ def check(read: Callable[[], Points]) -> str:
         prepared = prepare_cloud(points, _SPEC).points
         assert np.isfinite(prepared).all()
         assert len(np.unique(prepared, axis=0)) == MIN_POINTS
-        outcome = "prepared"
-    except DoorstateError as error:
-        outcome = _refusal(error)
-    assert time.process_time() - started < LIMIT_S
-    return outcome
+        return "prepared"
 
-
-def _refusal(error: DoorstateError) -> str:
-    assert str(error).isprintable()
-    assert len(str(error)) <= MAX_MESSAGE_LENGTH
-    return type(error).__name__
-
-
-def _target(test: Callable[..., Any], **strategies: st.SearchStrategy[Any]) -> Target:
-    def target(**inputs: Any) -> None:
-        test(**inputs)
-
-    quick = settings(
-        max_examples=100,
-        deadline=None,
-        database=None,
-        derandomize=True,
-        suppress_health_check=list(HealthCheck),
-    )
-    return quick(given(**strategies)(target))
+    return outcome_of(prepare)
 
 
 def _read_file(data: bytes, options: ReadOptions, suffix: str) -> None:
@@ -126,7 +100,7 @@ def _read_bag(path: Path, options: ReadOptions, topic_number: int) -> None:
                 assert isinstance(stamped.frame_id, str)
                 check(lambda cloud=stamped.cloud: _cloud_or_raise(cloud))
     except DoorstateError as error:
-        _refusal(error)
+        check_line(str(error))
 
 
 def _cloud_or_raise(cloud: Points | DoorstateError) -> Points:
@@ -156,27 +130,31 @@ def _targets() -> dict[str, Target]:
     targets: dict[str, Target] = {}
     for suffix in CLOUD_SUFFIXES:
         data = png_files() if suffix == ".png" else damaged(examples.files(suffix))
-        targets[suffix[1:]] = _target(partial(_read_file, suffix=suffix), data=data, options=OPTIONS)
-    targets["name"] = _target(_read_named, data=damaged(examples.files(".csv")), stem=st.sampled_from(_STEMS))
+        targets[suffix[1:]] = fuzz_target(partial(_read_file, suffix=suffix), data=data, options=OPTIONS)
+    targets["name"] = fuzz_target(
+        _read_named, data=damaged(examples.files(".csv")), stem=st.sampled_from(_STEMS)
+    )
     for suffix in examples.CAMERA_SUFFIXES:
         data = damaged(examples.camera_files(suffix), YAML_TOKENS)
-        targets[f"camera-{suffix[1:]}"] = _target(partial(_read_camera, suffix=suffix), data=data)
+        targets[f"camera-{suffix[1:]}"] = fuzz_target(partial(_read_camera, suffix=suffix), data=data)
     messages = {
         "PointCloud2": cloud_messages(),
         "Image": image_messages(),
         "CompressedImage": compressed_messages(),
     }
     for name, message in messages.items():
-        targets[name] = _target(partial(_read_message, message_type=name), message=message, options=OPTIONS)
+        targets[name] = fuzz_target(
+            partial(_read_message, message_type=name), message=message, options=OPTIONS
+        )
     topic_number = st.integers(0, 5)
     for suffix in BAG_SUFFIXES:
         data = st.deferred(lambda suffix=suffix: damaged(examples.bags(suffix)))
         read = partial(_read_bag_file, suffix=suffix)
-        targets[suffix[1:]] = _target(read, data=data, options=OPTIONS, topic_number=topic_number)
-    targets["metadata"] = _target(
+        targets[suffix[1:]] = fuzz_target(read, data=data, options=OPTIONS, topic_number=topic_number)
+    targets["metadata"] = fuzz_target(
         _read_bag_folder, data=st.deferred(_metadata), options=OPTIONS, topic_number=topic_number
     )
-    return targets
+    return targets | predictions.targets() | settings_files.targets()
 
 
 TARGETS = _targets()

@@ -3,9 +3,12 @@
 
 from __future__ import annotations
 
+import gzip
+
 import pytest
 
 pytest.importorskip("rosbags")
+pytest.importorskip("fastapi")
 
 import numpy as np
 
@@ -13,7 +16,8 @@ from doorstate.io.camera import Pinhole
 from doorstate.io.options import ReadOptions
 from doorstate.io.readers import CLOUD_SUFFIXES, parse_cloud
 from doorstate.types import Points
-from tests.fuzz import examples, targets
+from tests.fuzz import examples, harness, predictions, settings_files, targets
+from tests.hand_made_clouds import image_of_a_rough_wall
 
 
 @pytest.mark.parametrize("name", targets.TARGETS)
@@ -32,8 +36,8 @@ def test_examples_are_read(suffix: str) -> None:
 
 
 def _slow() -> Points:
-    started = targets.time.process_time()
-    while targets.time.process_time() - started < 2 * targets.LIMIT_S:
+    started = harness.time.process_time()
+    while harness.time.process_time() - started < 2 * harness.LIMIT_S:
         pass
     return examples.SCENE
 
@@ -42,6 +46,39 @@ def _slow() -> Points:
     "read", [_slow, lambda: examples.SCENE.astype(np.float64), lambda: examples.SCENE[..., :2]]
 )
 def test_failures_are_noticed(read: object, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(targets, "LIMIT_S", 0.05)
+    monkeypatch.setattr(harness, "LIMIT_S", 0.05)
     with pytest.raises(AssertionError):
         targets.check(read)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("name", "data"),
+    [
+        ("experiment.toml", b"seed = " + b"[" * 5000),
+        ("experiment.toml", b"seed = " + b"1" * 5000),
+        ("comparison.json", b'{"name": ' + b"[" * 100_000),
+        ("comparison.json", b'{"name": "a", "dataset": "data", "networks": 5}'),
+        ("rows.csv", b"sample_id,scene\na," + b"[" * 100_000),
+        ("rows.csv", b"sample_id,camera,camera.width\na,b,640"),
+        ("predictions.csv.gz", gzip.compress(b"fold\n" + b"9" * 30)),
+        ("predictions.csv.gz", gzip.compress(b"fold\n1,2,3\n")),
+        (
+            "metrics.json",
+            b'{"runs": [{"method": "pointnet", "fold": -9, "metrics": {}, "environment": {}, "log": {}}]}',
+        ),
+    ],
+)
+def test_settings_that_once_failed_are_refused(name: str, data: bytes) -> None:
+    assert settings_files.read_settings(data, name).endswith("Error")
+
+
+def test_requests_that_once_failed_are_refused() -> None:
+    for query, headers in ((b"\x00=1", []), (b"roll=\xff", []), (None, [(b"content-length", b"x")])):
+        predictions.request_prediction((".npy", b""), query, headers)
+
+
+def test_half_precision_is_accepted() -> None:
+    cloud = image_of_a_rough_wall(60, 80).astype(np.float16)
+    assert predictions.predict_with_rule(cloud, None, "plane_state") == predictions.predict_with_rule(
+        cloud.astype(np.float32), None, "plane_state"
+    )

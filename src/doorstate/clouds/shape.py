@@ -30,7 +30,8 @@ def check_shape(points: Points) -> Points:
             expected="numbers of shape (N, 3) or (H, W, 3)",
             hint="keep x, y and z only" if has_more_values else None,
         )
-    return cloud
+    # Limits of coordinates, and squares of coordinates, exceed the range of float16.
+    return cloud.astype(np.float32) if cloud.dtype == np.float16 else cloud
 
 
 def check_single_cloud(points: Points) -> Points:

@@ -35,6 +35,8 @@ def check_predictions(results: Results, path_of: Callable[[str, int], Path]) -> 
         groups[str(method), int(str(fold))] = rows.index
     for record in results.runs:
         path = path_of(record.method, record.fold)
+        if not 0 <= record.fold < len(results.splits):
+            raise RunError(f"no fold {record.fold} in the splits", path=path, field="fold")
         run = table.loc[groups.pop((record.method, record.fold), [])]
         _check_labels(run, path)
         _check_roles(run, results.splits[record.fold], record.fold, path)

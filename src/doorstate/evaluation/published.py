@@ -8,6 +8,7 @@ environment and epoch log of every run. The same results give the same bytes.
 from __future__ import annotations
 
 import json
+import warnings
 import zlib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -52,17 +53,21 @@ def read_predictions(path: Path) -> pd.DataFrame:
         RunError: the file is missing or damaged.
     """
     try:
-        frame = pd.read_csv(
-            path,
-            dtype={**dict.fromkeys(TEXT_COLUMNS, "str"), "fold": "int64"},
-            keep_default_na=False,
-            na_values=[""],
-            index_col=False,
-            compression="gzip",
-        )
+        with warnings.catch_warnings():
+            warnings.simplefilter(
+                "error", pd.errors.ParserWarning
+            )  # lines longer than the header are cut off
+            frame = pd.read_csv(
+                path,
+                dtype={**dict.fromkeys(TEXT_COLUMNS, "str"), "fold": "int64"},
+                keep_default_na=False,
+                na_values=[""],
+                index_col=False,
+                compression="gzip",
+            )
         numeric = [name for name in frame if name not in (*TEXT_COLUMNS, "fold")]
         frame = frame.astype(dict.fromkeys(numeric, "float64"))
-    except (OSError, EOFError, zlib.error, ValueError) as error:
+    except (OSError, EOFError, zlib.error, ValueError, OverflowError, pd.errors.ParserWarning) as error:
         raise RunError(f"cannot be read ({error})", path=path) from error
     for name in KEY_COLUMNS:
         if name not in frame:

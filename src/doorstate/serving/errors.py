@@ -11,7 +11,7 @@ from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 
-from doorstate.errors import CloudContentError, DoorstateError
+from doorstate.errors import CloudContentError, ConfigError, DoorstateError
 from doorstate.serving.models import ErrorResponse
 from doorstate.serving.request import PredictQuery, format_parameter
 
@@ -43,8 +43,10 @@ def add_error_handlers(app: FastAPI) -> None:
         name = problem["loc"][-1]
         if problem["type"] == "extra_forbidden":
             parameters = ", ".join(PredictQuery.model_fields)
-            return _error_response(400, f"unknown parameter {name}: expected one of {parameters}")
-        return _error_response(400, f"{name}: {problem['msg']}")
+            refusal = ConfigError(f"unknown parameter {name}", expected=f"one of {parameters}")
+        else:
+            refusal = ConfigError(problem["msg"], field=str(name))
+        return _error_response(400, refusal.describe(format_parameter))
 
     @app.exception_handler(DoorstateError)
     async def unusable_file(_: Request, error: DoorstateError) -> Response:

@@ -53,7 +53,7 @@ class WorkQueue:
         """Call `work` in a worker thread with the body of a request, and return its result.
 
         Raises:
-            HTTPException: 413 too large, 503 too many files, 504 too slow.
+            HTTPException: 400 length that is no number, 413 too large, 503 too many files, 504 too slow.
             ClientDisconnect: the client closed the connection.
         """
         if not self._take_slot():
@@ -77,7 +77,11 @@ class WorkQueue:
     async def _read(self, request: Request, file: bytearray) -> None:
         limit = self._limits.max_bytes
         too_large = HTTPException(413, f"the file is larger than {limit / 2**20:g} MiB")
-        if int(request.headers.get("content-length", 0)) > limit:
+        try:
+            declared = int(request.headers.get("content-length", 0))
+        except ValueError as error:
+            raise HTTPException(400, "Content-Length is not a number") from error
+        if declared > limit:
             raise too_large
         async for chunk in request.stream():
             file += chunk

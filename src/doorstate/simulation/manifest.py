@@ -37,10 +37,12 @@ def unflatten(columns: Mapping[str, str]) -> Row:
         outer, _, inner = name.partition(".")
         if outer not in Row.model_fields or not value:
             continue
-        if inner:
-            nested.setdefault(outer, {})[inner] = value
-        else:
+        if not inner:
             nested[outer] = value
+        elif isinstance(group := nested.setdefault(outer, {}), dict):
+            group[inner] = value
+        else:
+            raise DatasetError(f"stands beside a column {outer!r}", field=name)
     try:
         return Row.model_validate(nested)
     except ValidationError as error:

@@ -75,7 +75,10 @@ class Row(FrozenModel):
     @field_validator("scene", mode="before")
     @classmethod
     def _scene_from_json(cls, scene: object) -> object:
-        return json.loads(scene) if isinstance(scene, str) else scene
+        try:
+            return json.loads(scene) if isinstance(scene, str) else scene
+        except RecursionError as error:
+            raise ValueError("nested too deeply") from error
 
     def camera_pose(self) -> CameraPose:
         """Return the camera in the door frame."""

@@ -7,11 +7,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from pydantic import ValidationError
+
 from doorstate._jobs import Progress, default_workers, no_progress, run_pieces
 from doorstate.dataset.loader import check_states
 from doorstate.dataset.splits import Role, draw_splits, read_splits, write_splits
 from doorstate.dataset.store import PreparedDataset, open_dataset
-from doorstate.errors import ConfigError, RunError
+from doorstate.errors import ConfigError, RunError, first_validation_error
 from doorstate.rules import create_rule
 from doorstate.training.config import RunConfig
 from doorstate.training.experiment import Experiment
@@ -105,15 +107,20 @@ def prepare_comparison(experiment: Experiment, folder: Path) -> None:
 
 
 def read_comparison(folder: Path) -> dict[str, Any]:
-    """Return the configuration of a comparison.
+    """Return the configuration of a comparison, as an experiment with its recipes in place of their name.
 
     Raises:
-        RunError: the folder holds none.
+        RunError: the folder holds none, or a damaged one.
     """
     path = folder / "comparison.json"
     if not path.is_file():
         raise RunError("there is no comparison in this folder", path=folder, hint="run it first")
-    return read_json(path)
+    settings = read_json(path)
+    try:
+        experiment = Experiment.model_validate(settings | {"recipe": ""})
+    except ValidationError as error:
+        raise RunError(first_validation_error(error), path=path) from error
+    return experiment.model_dump(mode="json") | settings
 
 
 def train_fold(

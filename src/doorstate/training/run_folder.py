@@ -150,7 +150,7 @@ def read_json(path: Path) -> dict[str, Any]:
     """
     try:
         value = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise RunError(f"cannot be read ({error})", path=path) from error
     if not isinstance(value, dict):
         raise RunError("holds no JSON object", path=path)
