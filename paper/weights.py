@@ -153,7 +153,7 @@ def studies_of(experiment: str) -> list[Definition]:
 
     A study that was published with other weights ends the program.
     """
-    found = []
+    studies = []
     for definition in read_definitions():
         if not (definition.is_study and experiment in definition.starts_from):
             continue
@@ -165,8 +165,8 @@ def studies_of(experiment: str) -> list[Definition]:
             sys.exit(
                 f"results/{definition.name} tests weights of {' and '.join(sorted(starts))}: run it again"
             )
-        found.append(definition)
-    return found
+        studies.append(definition)
+    return studies
 
 
 def _likely_a_door(results: Results, network: str) -> np.ndarray:

@@ -41,7 +41,7 @@ def place_cases(results: Results) -> Mapping[str, Case]:
 def samples_between(results: Results) -> set[str]:
     """Return the tested samples with trained ones on both sides along the half-ring, at about the same distance."""
     places = results.manifest[["robot_angle_deg", "distance_m"]]
-    found: set[str] = set()
+    samples: set[str] = set()
     for roles in results.splits:
         role = pd.Series(roles, dtype="str").reindex(places.index)
         trained = places[role == "train"].to_numpy()
@@ -50,5 +50,5 @@ def samples_between(results: Results) -> set[str]:
         ):
             beside = trained[np.abs(trained[:, 1] - distance_m) <= RING_M, 0]
             if (beside < bearing_deg).any() and (beside > bearing_deg).any():
-                found.add(str(sample))
-    return found
+                samples.add(str(sample))
+    return samples

@@ -36,13 +36,13 @@ def picture(row: Row, frame: Frame) -> Image.Image:
 
 def lines(preset: str) -> dict[str, list[Image.Image]]:
     """Return the first samples of each kind, as many as a line holds; the closed door decides the occluded share."""
-    found: defaultdict[str, list[Image.Image]] = defaultdict(list)
+    lines_by_kind: defaultdict[str, list[Image.Image]] = defaultdict(list)
     for index in range(SCENES):
         rows, frames = simulate_rows(PRESETS[preset], 0, index)
-        line = found[getattr(rows[0], KINDS[preset])]
+        line = lines_by_kind[getattr(rows[0], KINDS[preset])]
         if len(line) < COLUMNS:
-            line += [picture(*each) for each in zip(rows, frames, strict=True)]
-    return dict(sorted(found.items()))
+            line += [picture(row, frame) for row, frame in zip(rows, frames, strict=True)]
+    return dict(sorted(lines_by_kind.items()))
 
 
 def draw(preset: str) -> bytes:
