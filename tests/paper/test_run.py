@@ -57,7 +57,7 @@ def test_a_finished_experiment_is_not_run_again_for_those_that_start_from_it(
     monkeypatch.setattr(paths, "RUNS", tmp_path)
     folder = tmp_path / "mixture-longer"
     folder.mkdir()
-    content = {"name": "mixture-longer", "networks": ["pointnet2"], "rules": [], "folds": 1}
+    content = {"name": folder.name, "dataset": "data", "networks": ["pointnet2"], "rules": [], "folds": 1}
     (folder / "comparison.json").write_text(json.dumps(content))
     for is_finished in (False, True):
         if is_finished:
