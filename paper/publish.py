@@ -7,10 +7,11 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from doorstate._files import write_csv
-from doorstate.dataset.store import MANIFEST, open_dataset
+from doorstate.dataset.store import open_dataset
 from doorstate.evaluation.comparison import Results
 from doorstate.evaluation.predictions import load_results, save_results
 from doorstate.evaluation.study import load_study, save_study
+from doorstate.simulation.manifest import MANIFEST_FILE
 
 from . import paths
 from .definition import read_definition
@@ -47,5 +48,5 @@ def publish_datasets(comparisons: Iterable[Results]) -> None:
         tested = {sample for fold in roles for sample, role in fold.items() if role == "test"}
         dataset = open_dataset(results.dataset_folder)
         rows = [row for row in dataset.rows if row["sample_id"] in tested]
-        write_csv(folder / f"{MANIFEST}.gz", rows)
+        write_csv(folder / f"{MANIFEST_FILE}.gz", rows)
         dataset.description.model_copy(update={"samples": len(rows), "clouds": "replayed"}).save(folder)

@@ -121,7 +121,7 @@ def test_there_is_at_least_one_worker() -> None:
 def test_shards_cover_all_pieces() -> None:
     pieces = list(range(11))
     for count in (1, 3, 8, 11, 20):
-        shares = [Shard.parse(f"{number}/{count}").of(pieces) for number in range(1, count + 1)]
+        shares = [Shard.parse(f"{number}/{count}").select(pieces) for number in range(1, count + 1)]
         assert sorted(piece for share in shares for piece in share) == pieces
         assert max(map(len, shares)) - min(map(len, shares)) <= 1
 

@@ -41,7 +41,7 @@ class Shard(NamedTuple):
             raise ConfigError(f"{text!r} is not a shard", field="shard", expected="number/count, such as 2/8")
         return shard
 
-    def of(self, pieces: Sequence[Piece]) -> Sequence[Piece]:
+    def select(self, pieces: Sequence[Piece]) -> Sequence[Piece]:
         """Return every `shards`-th piece, so that all shards take about as long."""
         return pieces[self.number - 1 :: self.shards]
 

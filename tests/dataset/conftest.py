@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from doorstate._files import write_csv
-from doorstate.dataset.store import CLOUDS, MANIFEST, DatasetDescription
+from doorstate.dataset.store import CLOUDS_FILE, DatasetDescription
 from doorstate.simulation.camera import DepthCamera
+from doorstate.simulation.manifest import MANIFEST_FILE
 from doorstate.simulation.presets import PRESETS
 from doorstate.simulation.settings import SimulationSettings
 from doorstate.simulation.writer import simulate_dataset
@@ -31,9 +32,10 @@ def prepared(tmp_path: Path) -> Path:
     """Eleven random clouds of 40 points with alternating states."""
     folder = tmp_path / "prepared"
     folder.mkdir()
-    np.save(folder / CLOUDS, np.random.default_rng(0).uniform(1, 4, (11, 40, 3)).astype(np.float32))
+    np.save(folder / CLOUDS_FILE, np.random.default_rng(0).uniform(1, 4, (11, 40, 3)).astype(np.float32))
     write_csv(
-        folder / MANIFEST, [{"sample_id": f"s{number}", "state": STATES[number % 3]} for number in range(11)]
+        folder / MANIFEST_FILE,
+        [{"sample_id": f"s{number}", "state": STATES[number % 3]} for number in range(11)],
     )
     DatasetDescription(
         kind="imported", source="by hand", num_points=40, samples=11, doorstate_version="0"

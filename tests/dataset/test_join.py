@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from doorstate.dataset.join import join_datasets
-from doorstate.dataset.store import CLOUDS, DESCRIPTION, MANIFEST, PARTS, PreparedDataset, open_dataset
+from doorstate.dataset.store import CLOUDS_FILE, DESCRIPTION_FILE, PARTS_FILE, PreparedDataset, open_dataset
 from doorstate.errors import ConfigError, DatasetError
+from doorstate.simulation.manifest import MANIFEST_FILE
 
 
 def test_a_joined_data_set_has_all_clouds_and_parts(scene_dataset: PreparedDataset) -> None:
@@ -52,7 +53,7 @@ def test_paper_doors_and_scenes_can_be_joined(
 def test_parts_are_left_out_if_a_source_has_none(scene_dataset: PreparedDataset, tmp_path: Path) -> None:
     folder = scene_dataset.folder.parent
     shutil.copytree(folder / "no-door-160", tmp_path / "blind")
-    (tmp_path / "blind" / PARTS).unlink()
+    (tmp_path / "blind" / PARTS_FILE).unlink()
     joined = join_datasets([folder / "varied-160", tmp_path / "blind"], tmp_path / "joined")
     assert not joined.has_parts
     assert len(joined) == 36
@@ -62,11 +63,11 @@ def test_a_killed_join_is_repeated(scene_dataset: PreparedDataset, tmp_path: Pat
     parts = [scene_dataset.folder.parent / name for name in ("varied-160", "no-door-160")]
     folder = tmp_path / "joined"
     whole = join_datasets(parts, folder)
-    (folder / DESCRIPTION).unlink()
-    (folder / MANIFEST).unlink()
-    (folder / CLOUDS).write_bytes(b"old")
+    (folder / DESCRIPTION_FILE).unlink()
+    (folder / MANIFEST_FILE).unlink()
+    (folder / CLOUDS_FILE).write_bytes(b"old")
     assert len(join_datasets(parts, folder)) == len(whole)
-    (folder / DESCRIPTION).rename(tmp_path / DESCRIPTION)
+    (folder / DESCRIPTION_FILE).rename(tmp_path / DESCRIPTION_FILE)
     (folder / "notes.txt").touch()
     with pytest.raises(ConfigError, match="not empty"):
         join_datasets(parts, folder)

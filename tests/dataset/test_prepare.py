@@ -14,19 +14,19 @@ from doorstate.clouds.preparation import CloudSpec, prepare_cloud
 from doorstate.dataset import prepare
 from doorstate.dataset.preparation import Preparation
 from doorstate.dataset.prepare import REJECTED, prepare_dataset
-from doorstate.dataset.store import CLOUDS, DESCRIPTION, MANIFEST, PARTS, open_dataset
+from doorstate.dataset.store import CLOUDS_FILE, DESCRIPTION_FILE, PARTS_FILE, open_dataset
 from doorstate.dataset.strata import distance_band, region
 from doorstate.errors import ConfigError, DatasetError
 from doorstate.io.options import ReadOptions
 from doorstate.io.pcd import write_pcd
 from doorstate.io.readers import read_cloud
 from doorstate.simulation.frames import replay
-from doorstate.simulation.manifest import unflatten
+from doorstate.simulation.manifest import MANIFEST_FILE, unflatten
 from doorstate.types import STATES, Part
 
 NUM_POINTS = 256
 SPEC = CloudSpec(num_points=NUM_POINTS)
-FILES = (MANIFEST, CLOUDS, PARTS, DESCRIPTION, "preparation.json")
+FILES = (MANIFEST_FILE, CLOUDS_FILE, PARTS_FILE, DESCRIPTION_FILE, "preparation.json")
 
 
 @pytest.fixture
@@ -47,7 +47,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 def test_a_data_set_without_clouds_renders_them_from_its_rows(undisturbed: Path, tmp_path: Path) -> None:
     stored = open_dataset(undisturbed)
-    shutil.copy(undisturbed / MANIFEST, tmp_path)
+    shutil.copy(undisturbed / MANIFEST_FILE, tmp_path)
     stored.description.model_copy(update={"clouds": "replayed"}).save(tmp_path)
     rows = open_dataset(tmp_path)
     np.testing.assert_array_equal(rows.cloud(4, 20), stored.cloud(4)[:20])
@@ -65,7 +65,7 @@ def test_the_cache_of_replayed_clouds_is_bounded(
     undisturbed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     stored = open_dataset(undisturbed)
-    shutil.copy(undisturbed / MANIFEST, tmp_path)
+    shutil.copy(undisturbed / MANIFEST_FILE, tmp_path)
     stored.description.model_copy(update={"clouds": "replayed"}).save(tmp_path)
     rows = open_dataset(tmp_path)
     monkeypatch.setattr("doorstate.dataset.store._CACHED_CLOUDS", 2)
@@ -134,7 +134,12 @@ def test_a_stopped_preparation_continues_with_the_missing_pieces(
 
 
 @pytest.mark.parametrize(
-    "lost", [[DESCRIPTION], [DESCRIPTION, CLOUDS], [DESCRIPTION, CLOUDS, PARTS, MANIFEST]]
+    "lost",
+    [
+        [DESCRIPTION_FILE],
+        [DESCRIPTION_FILE, CLOUDS_FILE],
+        [DESCRIPTION_FILE, CLOUDS_FILE, PARTS_FILE, MANIFEST_FILE],
+    ],
 )
 def test_a_preparation_that_stopped_while_assembling_is_completed(
     tiny_simulation: Path, undisturbed: Path, tmp_path: Path, lost: list[str]
@@ -187,7 +192,7 @@ def test_thinned_clouds_equal_those_of_a_predictor(tiny_simulation: Path, tmp_pa
         unthinned = prepare_cloud(thinned.raw_cloud(index), SPEC)
         np.testing.assert_array_equal(thinned.cloud(index), expected.points)
         assert not np.array_equal(expected.points, unthinned.points)
-    shutil.copy(tmp_path / "thin" / MANIFEST, tmp_path)
+    shutil.copy(tmp_path / "thin" / MANIFEST_FILE, tmp_path)
     thinned.description.model_copy(update={"clouds": "replayed"}).save(tmp_path)
     np.testing.assert_array_equal(open_dataset(tmp_path).cloud(7), thinned.cloud(7))
     with pytest.raises(ConfigError, match="something else"):
@@ -210,12 +215,12 @@ def test_a_changed_manifest_is_refused(
 ) -> None:
     source = tmp_path / "changed"
     shutil.copytree(tiny_simulation, source)
-    rows = read_csv(source / MANIFEST)
+    rows = read_csv(source / MANIFEST_FILE)
     for row in rows if value is None else rows[4:5]:
         row.pop(column)
         if value is not None:
             row[column] = value
-    write_csv(source / MANIFEST, rows)
+    write_csv(source / MANIFEST_FILE, rows)
     with pytest.raises(DatasetError, match=message) as caught:
         prepare_dataset(Preparation(source, SPEC), tmp_path / "doors", workers=1)
     assert rows[0 if value is None else 4]["sample_id"] in str(caught.value)
@@ -224,7 +229,7 @@ def test_a_changed_manifest_is_refused(
 
 def test_an_unfinished_simulation_is_not_prepared(tiny_simulation: Path, tmp_path: Path) -> None:
     shutil.copytree(tiny_simulation, tmp_path / "unfinished")
-    (tmp_path / "unfinished" / MANIFEST).unlink()
+    (tmp_path / "unfinished" / MANIFEST_FILE).unlink()
     with pytest.raises(DatasetError, match="not complete"):
         prepare_dataset(
             Preparation(tmp_path / "unfinished", SPEC),

@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from doorstate.dataset.store import CLOUDS, DESCRIPTION, MANIFEST, PARTS, open_dataset
+from doorstate.dataset.store import CLOUDS_FILE, DESCRIPTION_FILE, PARTS_FILE, open_dataset
 from doorstate.errors import DatasetError
+from doorstate.simulation.manifest import MANIFEST_FILE
 from doorstate.types import STATES
 
 
@@ -18,7 +19,7 @@ def test_rows_clouds_and_labels_have_the_same_order(prepared: Path) -> None:
     dataset = open_dataset(prepared)
     assert (len(dataset), dataset.num_points) == (11, 40)
     assert [STATES[label] for label in dataset.labels] == [row["state"] for row in dataset.rows]
-    stored = np.load(prepared / CLOUDS)
+    stored = np.load(prepared / CLOUDS_FILE)
     for index, row in enumerate(dataset.rows):
         assert dataset.index_of(row["sample_id"]) == index
         np.testing.assert_array_equal(dataset.cloud(index), stored[index])
@@ -39,7 +40,7 @@ def test_an_unknown_sample_is_refused(prepared: Path) -> None:
 
 def test_parts_are_read_if_they_are_stored(prepared: Path) -> None:
     parts = np.arange(440, dtype=np.uint16).reshape(11, 40).astype(np.uint8)
-    np.save(prepared / PARTS, parts)
+    np.save(prepared / PARTS_FILE, parts)
     np.testing.assert_array_equal(open_dataset(prepared).parts(3), parts[3])
 
 
@@ -60,30 +61,30 @@ def replace(path: Path, old: str, new: str) -> None:
 @pytest.mark.parametrize(
     ("damage", "name", "field"),
     [
-        (lambda folder: (folder / DESCRIPTION).unlink(), "", None),
-        (lambda folder: truncate(folder / DESCRIPTION, 30), DESCRIPTION, None),
-        (lambda folder: replace(folder / DESCRIPTION, "imported", "guessed"), DESCRIPTION, None),
-        (lambda folder: (folder / DESCRIPTION).write_bytes(b"\xff\xff"), "", None),
-        (lambda folder: (folder / CLOUDS).unlink(), "", None),
-        (lambda folder: truncate(folder / CLOUDS, 0), "", None),
-        (lambda folder: truncate(folder / CLOUDS, 60), "", None),
-        (lambda folder: truncate(folder / CLOUDS, 1000), "", None),
-        (lambda folder: (folder / CLOUDS).write_bytes(b"no array at all"), "", None),
-        (lambda folder: np.save(folder / CLOUDS, np.zeros((11, 39, 3), np.float32)), CLOUDS, None),
-        (lambda folder: np.save(folder / CLOUDS, np.zeros((11, 40, 3))), CLOUDS, None),
-        (lambda folder: np.save(folder / PARTS, np.zeros((11, 39), np.uint8)), PARTS, None),
-        (lambda folder: truncate(folder / PARTS, 0), "", None),
-        (lambda folder: (folder / MANIFEST).unlink(), "", None),
-        (lambda folder: drop_last_line(folder / MANIFEST), MANIFEST, None),
-        (lambda folder: replace(folder / MANIFEST, "sample_id", "sample"), MANIFEST, "sample_id"),
-        (lambda folder: replace(folder / MANIFEST, "state", "status"), MANIFEST, "state"),
-        (lambda folder: replace(folder / MANIFEST, "semi_open", "ajar"), MANIFEST, "state"),
+        (lambda folder: (folder / DESCRIPTION_FILE).unlink(), "", None),
+        (lambda folder: truncate(folder / DESCRIPTION_FILE, 30), DESCRIPTION_FILE, None),
+        (lambda folder: replace(folder / DESCRIPTION_FILE, "imported", "guessed"), DESCRIPTION_FILE, None),
+        (lambda folder: (folder / DESCRIPTION_FILE).write_bytes(b"\xff\xff"), "", None),
+        (lambda folder: (folder / CLOUDS_FILE).unlink(), "", None),
+        (lambda folder: truncate(folder / CLOUDS_FILE, 0), "", None),
+        (lambda folder: truncate(folder / CLOUDS_FILE, 60), "", None),
+        (lambda folder: truncate(folder / CLOUDS_FILE, 1000), "", None),
+        (lambda folder: (folder / CLOUDS_FILE).write_bytes(b"no array at all"), "", None),
+        (lambda folder: np.save(folder / CLOUDS_FILE, np.zeros((11, 39, 3), np.float32)), CLOUDS_FILE, None),
+        (lambda folder: np.save(folder / CLOUDS_FILE, np.zeros((11, 40, 3))), CLOUDS_FILE, None),
+        (lambda folder: np.save(folder / PARTS_FILE, np.zeros((11, 39), np.uint8)), PARTS_FILE, None),
+        (lambda folder: truncate(folder / PARTS_FILE, 0), "", None),
+        (lambda folder: (folder / MANIFEST_FILE).unlink(), "", None),
+        (lambda folder: drop_last_line(folder / MANIFEST_FILE), MANIFEST_FILE, None),
+        (lambda folder: replace(folder / MANIFEST_FILE, "sample_id", "sample"), MANIFEST_FILE, "sample_id"),
+        (lambda folder: replace(folder / MANIFEST_FILE, "state", "status"), MANIFEST_FILE, "state"),
+        (lambda folder: replace(folder / MANIFEST_FILE, "semi_open", "ajar"), MANIFEST_FILE, "state"),
     ],
 )
 def test_a_damaged_folder_is_refused_with_its_file(
     prepared: Path, damage: Callable[[Path], None], name: str, field: str | None
 ) -> None:
-    np.save(prepared / PARTS, np.zeros((11, 40), np.uint8))
+    np.save(prepared / PARTS_FILE, np.zeros((11, 40), np.uint8))
     open_dataset(prepared)
     damage(prepared)
     with pytest.raises(DatasetError) as refused:

@@ -13,9 +13,9 @@ import pytest
 
 from doorstate._files import write_csv
 from doorstate.dataset.splits import draw_splits, read_splits, write_splits
-from doorstate.dataset.store import CLOUDS, MANIFEST, PARTS, DatasetDescription, PreparedDataset, open_dataset
+from doorstate.dataset.store import CLOUDS_FILE, PARTS_FILE, DatasetDescription, PreparedDataset, open_dataset
 from doorstate.dataset.strata import distance_band, region
-from doorstate.simulation.manifest import flatten
+from doorstate.simulation.manifest import MANIFEST_FILE, flatten
 from doorstate.simulation.presets import PRESETS, draw_rows
 from doorstate.types import NO_DOOR, STATES, Part
 
@@ -29,11 +29,11 @@ def _write_dataset(folder: Path, rows: list[dict[str, str]], kind: str) -> Prepa
     generator = np.random.default_rng(3)
     folder.mkdir()
     points = generator.uniform(-2.0, 2.0, (len(rows), POINTS, 3)).astype(np.float32)
-    np.save(folder / CLOUDS, points)
+    np.save(folder / CLOUDS_FILE, points)
     if kind == "simulated":
         parts = generator.choice([Part.WALL, Part.LEAF, Part.FLOOR], (len(rows), POINTS)).astype(np.uint8)
-        np.save(folder / PARTS, parts)
-    write_csv(folder / MANIFEST, rows)
+        np.save(folder / PARTS_FILE, parts)
+    write_csv(folder / MANIFEST_FILE, rows)
     DatasetDescription.model_validate(
         {"kind": kind, "source": "made", "num_points": POINTS, "samples": len(rows), "doorstate_version": "0"}
     ).save(folder)

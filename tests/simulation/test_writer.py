@@ -18,10 +18,10 @@ from doorstate.io.options import ReadOptions
 from doorstate.io.readers import read_cloud
 from doorstate.simulation.camera import DepthCamera
 from doorstate.simulation.frames import replay
-from doorstate.simulation.manifest import unflatten
+from doorstate.simulation.manifest import MANIFEST_FILE, unflatten
 from doorstate.simulation.presets import PRESETS
 from doorstate.simulation.settings import RAW_KINDS, SimulationSettings
-from doorstate.simulation.writer import MANIFEST, is_simulated, read_settings, simulate_dataset
+from doorstate.simulation.writer import is_simulated, read_settings, simulate_dataset
 from doorstate.types import STATES
 
 SCRIPT = """
@@ -49,7 +49,7 @@ def test_the_manifest_has_three_states_per_pose(tmp_path: Path) -> None:
     assert [(row["pose_id"], row["state"]) for row in rows] == [
         (f"p{index:04d}", state) for index in PRESETS["ogurob"].indices(10) for state in STATES
     ]
-    assert sorted(path.name for path in (tmp_path / "data").iterdir()) == [MANIFEST, "simulation.json"]
+    assert sorted(path.name for path in (tmp_path / "data").iterdir()) == [MANIFEST_FILE, "simulation.json"]
     assert is_simulated(tmp_path / "data")
     assert read_settings(tmp_path / "data") == settings_of(10)
     steps.clear()
@@ -92,7 +92,7 @@ def test_a_stopped_simulation_continues_with_the_missing_pieces(tmp_path: Path) 
     steps: list[tuple[int, int]] = []
     assert simulate_dataset(folder, settings_of(20), 1, lambda *step: steps.append(step)) == whole
     assert steps == [(1, 3), (2, 3), (3, 3)]
-    assert (folder / MANIFEST).read_bytes() == (tmp_path / "undisturbed" / MANIFEST).read_bytes()
+    assert (folder / MANIFEST_FILE).read_bytes() == (tmp_path / "undisturbed" / MANIFEST_FILE).read_bytes()
     assert not (folder / "pieces").exists()
 
 
@@ -118,14 +118,14 @@ def test_a_killed_simulation_continues_and_leaves_no_worker(tmp_path: Path) -> N
         parent.send_signal(signal.SIGKILL)
         # Workers inherited the pipe: it ends when the last of them has.
         parent.communicate(timeout=30)
-    assert not (folder / MANIFEST).exists()
+    assert not (folder / MANIFEST_FILE).exists()
     finished = len(list(folder.glob("pieces/[0-9]*.csv")))
     assert 1 <= finished < 6
     steps: list[tuple[int, int]] = []
     simulate_dataset(folder, settings, 1, lambda *step: steps.append(step))
     assert steps[0] == (finished, 6)
     simulate_dataset(tmp_path / "undisturbed", settings, 1)
-    assert (folder / MANIFEST).read_bytes() == (tmp_path / "undisturbed" / MANIFEST).read_bytes()
+    assert (folder / MANIFEST_FILE).read_bytes() == (tmp_path / "undisturbed" / MANIFEST_FILE).read_bytes()
 
 
 def test_a_folder_with_other_contents_is_refused(tmp_path: Path) -> None:

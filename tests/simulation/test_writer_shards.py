@@ -10,9 +10,10 @@ import pytest
 from doorstate._jobs import Shard
 from doorstate.errors import ConfigError
 from doorstate.simulation.camera import DepthCamera
+from doorstate.simulation.manifest import MANIFEST_FILE
 from doorstate.simulation.presets import Preset, PresetName
 from doorstate.simulation.settings import SimulationSettings
-from doorstate.simulation.writer import MANIFEST, read_settings, simulate_dataset, simulate_shard
+from doorstate.simulation.writer import read_settings, simulate_dataset, simulate_shard
 
 CAMERA = DepthCamera(width=40, height=30)
 
@@ -45,7 +46,7 @@ def test_shards_in_any_order_join_to_the_same_bytes(tmp_path: Path, name: Preset
     whole = simulate_dataset(tmp_path / "whole", settings, 1)
     for shard in ("3/3", "1/3", "3/3"):
         simulate_shard(tmp_path / "shared", settings, Shard.parse(shard), 1)
-    assert not (tmp_path / "shared" / MANIFEST).exists()
+    assert not (tmp_path / "shared" / MANIFEST_FILE).exists()
     assert sorted(path.name for path in (tmp_path / "shared" / "pieces").iterdir()) == [
         "00000.csv",
         "00002.csv",

@@ -11,8 +11,9 @@ import pytest
 from doorstate._files import read_csv, write_csv
 from doorstate.dataset.join import join_datasets
 from doorstate.dataset.splits import draw_splits, read_splits, write_splits
-from doorstate.dataset.store import MANIFEST, PreparedDataset
+from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import ConfigError, RunError
+from doorstate.simulation.manifest import MANIFEST_FILE
 from doorstate.training.comparison import compare, prepare_comparison
 from doorstate.training.experiment import Experiment
 from doorstate.training.run_folder import read_json
@@ -56,8 +57,8 @@ def test_scene_is_seen_regardless_of_the_sensor(scene_dataset: PreparedDataset, 
     comparison = prepared(tmp_path / "one", scene_dataset, protocol="by-scene", heads=("door",))
     noisy = tmp_path / "noisy"
     shutil.copytree(scene_dataset.folder, noisy)
-    rows = read_csv(noisy / MANIFEST)
-    write_csv(noisy / MANIFEST, [row | {"sample_id": row["sample_id"] + "-noisy"} for row in rows])
+    rows = read_csv(noisy / MANIFEST_FILE)
+    write_csv(noisy / MANIFEST_FILE, [row | {"sample_id": row["sample_id"] + "-noisy"} for row in rows])
     study(trained={"one": str(comparison)}, tested={"noisy": str(noisy)}).prepare(tmp_path / "s")
     (roles,) = read_splits(tmp_path / "s" / "one" / "noisy" / "splits.csv")
     before = read_splits(comparison / "splits.csv")[0]

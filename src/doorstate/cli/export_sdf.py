@@ -27,13 +27,12 @@ def export_sdf(
     """
     from doorstate._files import read_csv, write_text
     from doorstate.cli.console import stdout
-    from doorstate.simulation.manifest import unflatten
+    from doorstate.simulation.manifest import MANIFEST_FILE, unflatten
     from doorstate.simulation.sdf import sdf_world
-    from doorstate.simulation.writer import MANIFEST
 
-    manifest = source / MANIFEST
+    manifest = source / MANIFEST_FILE
     if not manifest.is_file():
-        raise ConfigError(f"not a simulated folder: no {MANIFEST}", path=source)
+        raise ConfigError(f"not a simulated folder: no {MANIFEST_FILE}", path=source)
     rows = {row.get("sample_id", ""): row for row in read_csv(manifest)}
     for sample in samples:
         if sample not in rows:

@@ -12,14 +12,14 @@ import numpy as np
 from doorstate import __version__
 from doorstate._files import atomic_path, is_vacant, write_csv
 from doorstate.dataset.store import (
-    CLOUDS,
-    MANIFEST,
-    PARTS,
+    CLOUDS_FILE,
+    PARTS_FILE,
     DatasetDescription,
     PreparedDataset,
     open_dataset,
 )
 from doorstate.errors import ConfigError, DatasetError
+from doorstate.simulation.manifest import MANIFEST_FILE
 
 _SEPARATOR = " + "  # between the sources of a joined data set
 
@@ -50,11 +50,11 @@ def join_datasets(sources: Sequence[Path], folder: Path) -> PreparedDataset:
     if count > 1:
         raise DatasetError(f"{count} samples are named {name!r}", field="sample_id")
     folder.mkdir(parents=True, exist_ok=True)
-    _stack(folder / CLOUDS, [dataset.clouds for dataset in datasets])
+    _stack(folder / CLOUDS_FILE, [dataset.clouds for dataset in datasets])
     if all(dataset.has_parts for dataset in datasets):
         parts = [dataset.parts_of(np.arange(len(dataset)), num_points) for dataset in datasets]
-        _stack(folder / PARTS, parts)
-    write_csv(folder / MANIFEST, rows)
+        _stack(folder / PARTS_FILE, parts)
+    write_csv(folder / MANIFEST_FILE, rows)
     names = [name for dataset in datasets for name in dataset.description.source.split(_SEPARATOR)]
     limits_m = [dataset.description.max_depth_m for dataset in datasets]
     kinds = {dataset.description.kind for dataset in datasets}
@@ -84,7 +84,7 @@ def check_same_sampling(dataset: PreparedDataset, reference: PreparedDataset) ->
 def _is_unfinished(folder: Path) -> bool:
     """Return True for the files of a join that was killed before it wrote its description."""
     names = {path.name for path in folder.iterdir() if ".tmp." not in path.name} if folder.is_dir() else set()
-    return CLOUDS in names and names <= {CLOUDS, PARTS, MANIFEST}
+    return CLOUDS_FILE in names and names <= {CLOUDS_FILE, PARTS_FILE, MANIFEST_FILE}
 
 
 def _stack(target: Path, arrays: Sequence[np.ndarray]) -> None:

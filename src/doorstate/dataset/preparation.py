@@ -16,8 +16,8 @@ from doorstate.dataset.layouts import find_layout
 from doorstate.dataset.strata import distance_band, region
 from doorstate.errors import ConfigError, DatasetError
 from doorstate.io.options import ReadOptions
-from doorstate.simulation.manifest import unflatten
-from doorstate.simulation.writer import MANIFEST, is_simulated, read_settings
+from doorstate.simulation.manifest import MANIFEST_FILE, unflatten
+from doorstate.simulation.writer import is_simulated, read_settings
 
 CLAIM = "preparation.json"
 
@@ -90,10 +90,10 @@ class Preparation(NamedTuple):
 
 
 def _simulated_rows(source: Path) -> list[dict[str, str]]:
-    if not (source / MANIFEST).exists():
+    if not (source / MANIFEST_FILE).exists():
         raise DatasetError("the simulation is not complete", path=source, hint="continue it first")
     rows = []
-    for row in read_csv(source / MANIFEST):
+    for row in read_csv(source / MANIFEST_FILE):
         sample = unflatten(row)
         rows.append(
             row

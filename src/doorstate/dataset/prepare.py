@@ -16,10 +16,9 @@ from doorstate.dataset.pieces import PieceClouds, SavedPieces
 from doorstate.dataset.preparation import CLAIM, Preparation
 from doorstate.dataset.sampling import sample_cloud, sample_frame
 from doorstate.dataset.store import (
-    CLOUDS,
-    DESCRIPTION,
-    MANIFEST,
-    PARTS,
+    CLOUDS_FILE,
+    DESCRIPTION_FILE,
+    PARTS_FILE,
     DatasetDescription,
     PreparedDataset,
     open_dataset,
@@ -27,7 +26,7 @@ from doorstate.dataset.store import (
 from doorstate.errors import CameraError, CloudError, DatasetError
 from doorstate.io.readers import read_cloud
 from doorstate.simulation.frames import Frame, depth_sha256, replay
-from doorstate.simulation.manifest import unflatten
+from doorstate.simulation.manifest import MANIFEST_FILE, unflatten
 
 REJECTED = "rejected.csv"
 _PIECES = "pieces"
@@ -65,7 +64,7 @@ def prepare_dataset(
         DatasetError: the source is empty, or none of its clouds could be prepared.
     """
     pieces, paths = _claim(preparation, folder)
-    if (folder / DESCRIPTION).exists():
+    if (folder / DESCRIPTION_FILE).exists():
         shutil.rmtree(folder / _PIECES, ignore_errors=True)
         progress(1, 1)
         rejected = read_csv(folder / REJECTED) if (folder / REJECTED).exists() else []
@@ -88,10 +87,12 @@ def prepare_shard(
         DatasetError: the source is empty.
     """
     pieces, paths = _claim(preparation, folder)
-    if (folder / DESCRIPTION).exists():
+    if (folder / DESCRIPTION_FILE).exists():
         progress(1, 1)
         return
-    run_pieces(_prepare_piece, shard.of(pieces), shard.of(paths), workers or default_workers(), progress)
+    run_pieces(
+        _prepare_piece, shard.select(pieces), shard.select(paths), workers or default_workers(), progress
+    )
 
 
 def assemble(
@@ -114,10 +115,10 @@ def assemble(
     ]
     if rejected:
         write_csv(folder / REJECTED, rejected)
-    saved.join_clouds(folder / CLOUDS, preparation.spec.num_points)
+    saved.join_clouds(folder / CLOUDS_FILE, preparation.spec.num_points)
     if preparation.is_simulated:
-        saved.join_parts(folder / PARTS, preparation.spec.num_points)
-    write_csv(folder / MANIFEST, kept)
+        saved.join_parts(folder / PARTS_FILE, preparation.spec.num_points)
+    write_csv(folder / MANIFEST_FILE, kept)
     DatasetDescription(
         kind="simulated" if preparation.is_simulated else "imported",
         source=preparation.source_name,

@@ -22,7 +22,7 @@ def sample_cloud(points: Points, spec: CloudSpec) -> PreparedCloud:
     count = len(prepared.points)
     if count < spec.num_points:
         raise CloudContentError(
-            f"too few points: {count} distinct, {spec.num_points} needed", suggestions={"points": count}
+            f"too few points: {count} distinct, {spec.num_points} needed", suggestions={"num_points": count}
         )
     return prepared
 

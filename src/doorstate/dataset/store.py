@@ -20,11 +20,11 @@ from doorstate.clouds.preparation import CloudSpec
 from doorstate.dataset.sampling import sample_frame
 from doorstate.errors import ConfigError, DatasetError, first_validation_error
 from doorstate.simulation.frames import Frame, replay
-from doorstate.simulation.manifest import unflatten
+from doorstate.simulation.manifest import MANIFEST_FILE, unflatten
 from doorstate.simulation.shading import shade
 from doorstate.types import NO_DOOR, STATES, Indices, Points
 
-MANIFEST, CLOUDS, PARTS, DESCRIPTION = "manifest.csv", "clouds.npy", "parts.npy", "dataset.json"
+CLOUDS_FILE, PARTS_FILE, DESCRIPTION_FILE = "clouds.npy", "parts.npy", "dataset.json"
 _LABELS = (*STATES, NO_DOOR)
 _CACHED_CLOUDS = 512
 _T = TypeVar("_T")
@@ -49,7 +49,7 @@ class DatasetDescription(FrozenModel):
 
     def save(self, folder: Path) -> None:
         """Write `dataset.json`, which marks the folder as complete."""
-        write_text(folder / DESCRIPTION, self.model_dump_json(indent=2) + "\n")
+        write_text(folder / DESCRIPTION_FILE, self.model_dump_json(indent=2) + "\n")
 
 
 class PreparedDataset:
@@ -198,7 +198,7 @@ def _cache(cache: dict[int, _T], index: int, value: _T, size: int) -> None:
 
 def is_prepared(folder: Path) -> bool:
     """Return True if `folder` holds a prepared data set."""
-    return (folder / DESCRIPTION).is_file()
+    return (folder / DESCRIPTION_FILE).is_file()
 
 
 def manifest_path(folder: Path) -> Path:
@@ -207,10 +207,10 @@ def manifest_path(folder: Path) -> Path:
     Raises:
         DatasetError: there is none.
     """
-    for path in (folder / MANIFEST, folder / f"{MANIFEST}.gz"):
+    for path in (folder / MANIFEST_FILE, folder / f"{MANIFEST_FILE}.gz"):
         if path.is_file():
             return path
-    raise DatasetError(f"no {MANIFEST} in this folder", path=folder)
+    raise DatasetError(f"no {MANIFEST_FILE} in this folder", path=folder)
 
 
 def open_dataset(folder: Path) -> PreparedDataset:
@@ -219,14 +219,14 @@ def open_dataset(folder: Path) -> PreparedDataset:
     Raises:
         DatasetError: the folder is missing, incomplete or inconsistent.
     """
-    path = folder / DESCRIPTION
+    path = folder / DESCRIPTION_FILE
     if not is_prepared(folder):
         raise DatasetError("is no prepared data set", path=folder, hint="prepare one first")
     try:
         description = DatasetDescription.model_validate_json(path.read_text(encoding="utf-8"))
         replayed = description.clouds == "replayed"
-        clouds = None if replayed else np.load(folder / CLOUDS, mmap_mode="r", allow_pickle=False)
-        parts_path = folder / PARTS
+        clouds = None if replayed else np.load(folder / CLOUDS_FILE, mmap_mode="r", allow_pickle=False)
+        parts_path = folder / PARTS_FILE
         parts = np.load(parts_path, mmap_mode="r", allow_pickle=False) if parts_path.is_file() else None
     except ValidationError as error:
         raise DatasetError(first_validation_error(error), path=path) from error
@@ -253,11 +253,11 @@ def _check(
         raise DatasetError(f"has {len(rows)} rows", path=manifest, expected=f"{description.samples}")
     if clouds is not None and (clouds.shape != shape or clouds.dtype != np.float32):
         raise DatasetError(
-            f"shape {clouds.shape}, {clouds.dtype}", path=folder / CLOUDS, expected=f"{shape}, float32"
+            f"shape {clouds.shape}, {clouds.dtype}", path=folder / CLOUDS_FILE, expected=f"{shape}, float32"
         )
     if parts is not None and (parts.shape != shape[:2] or parts.dtype != np.uint8):
         raise DatasetError(
-            f"shape {parts.shape}, {parts.dtype}", path=folder / PARTS, expected=f"{shape[:2]}, uint8"
+            f"shape {parts.shape}, {parts.dtype}", path=folder / PARTS_FILE, expected=f"{shape[:2]}, uint8"
         )
     for column in ("sample_id", "state"):
         if rows and column not in rows[0]:

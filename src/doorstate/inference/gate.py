@@ -89,7 +89,7 @@ class Gate:
             cloud: (N, 3) or organized (H, W, 3) metres, x forward, y left, z up; not measured as in
                 clouds.preparation. Holes are looked for in organized clouds and in flat ones of 4800 points or more.
         """
-        view = _View.of(np.asarray(cloud))
+        view = _View.from_cloud(np.asarray(cloud))
         checks = (
             self._enough_points,
             self._enough_measured,
@@ -167,7 +167,7 @@ class _View:
     pixels_per_reading: int
 
     @classmethod
-    def of(cls, cloud: NDArray[Any]) -> _View:
+    def from_cloud(cls, cloud: NDArray[Any]) -> _View:
         if cloud.ndim == 3 and cloud.shape[0] >= _LARGE_IMAGE_ROWS:
             cloud = np.ascontiguousarray(cloud[::2, ::2])
             return cls(cloud, is_measured(cloud), pixels_per_reading=4)

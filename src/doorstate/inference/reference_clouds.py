@@ -46,7 +46,7 @@ def reference_clouds(count: int, num_points: int, progress: Progress = no_progre
     fewest = min(map(len, clouds))
     if fewest < num_points:
         raise ConfigError(
-            f"a simulated cloud has only {fewest} distinct points, not {num_points}", field="points"
+            f"a simulated cloud has only {fewest} distinct points, not {num_points}", field="num_points"
         )
     labels = np.array([STATES.index(row.state) for row in rows], dtype=np.int64)
     return LabelledClouds(np.stack(clouds), labels)

@@ -9,7 +9,7 @@ import numpy as np
 
 from doorstate.rules.base import Parameters, Rule, RuleResult, state_by_angle
 from doorstate.rules.plan_lines import Floats, angle_deg
-from doorstate.rules.planes import Plane, component_numbers, thin, upright_plane
+from doorstate.rules.planes import Plane, component_numbers, upright_plane, voxel_downsample
 from doorstate.rules.walls import (
     WallParameters,
     above_floor,
@@ -56,7 +56,7 @@ class AngleBinsRule(Rule[AngleBinsParameters]):
             return RuleResult.abstain("too few pixels were measured")
         if len(points) < p.min_leaf_points:
             return RuleResult.abstain("too few points")
-        points = thin(points, p.voxel_m)
+        points = voxel_downsample(points, p.voxel_m)
         planes = self._planes(points[above_floor(points, p.wall.floor_margin_m)])
         if not planes:
             return RuleResult.abstain("no vertical plane")

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from doorstate.rules.base import Detection, Parameters, Rule, RuleResult
-from doorstate.rules.planes import thin
+from doorstate.rules.planes import voxel_downsample
 from doorstate.rules.walls import nearby_points
 from doorstate.types import DoorState, Points
 
@@ -48,7 +48,7 @@ class DepthRegionRule(Rule[DepthRegionParameters]):
             return RuleResult.abstain("too few pixels were measured")
         if len(points) < p.min_points:
             return RuleResult.abstain("too few points")
-        points = thin(points, p.voxel_m)
+        points = voxel_downsample(points, p.voxel_m)
         height_m = points[:, 2] - np.quantile(points[:, 2], 0.01)
         in_door = (height_m > p.floor_clearance_m) & (height_m < p.door_height_m)
         before_reach = (points[:, 0] > p.nearest_m) & (points[:, 0] < p.reach_m)

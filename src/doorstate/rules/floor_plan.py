@@ -42,7 +42,7 @@ def floor_plan(points: Floats, cell_m: float, min_height_m: float) -> FloorPlan:
     return FloorPlan(centres_m[upright], heights_m[upright], tops_m[upright])
 
 
-def plan_lines(cells: Floats, weights: Floats, threshold_m: float) -> Iterator[tuple[Line, Flags]]:
+def strongest_lines(cells: Floats, weights: Floats, threshold_m: float) -> Iterator[tuple[Line, Flags]]:
     """Yield lines in plan view, the strongest first, with a mask (K,) of the cells of each; no cell has two lines."""
     free = np.arange(len(cells))
     for _ in range(_MAX_LINES):

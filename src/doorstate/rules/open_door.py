@@ -20,7 +20,7 @@ from scipy.spatial import cKDTree
 from doorstate.clouds.measured import is_measured
 from doorstate.rules.base import Detection, Parameters, Rule, RuleResult
 from doorstate.rules.plan_lines import Flags, Floats, Line, strongest_line
-from doorstate.rules.planes import thin
+from doorstate.rules.planes import voxel_downsample
 from doorstate.types import DoorState, Indices, Points
 
 _MAX_BREAKS = 4  # of a row in one opening; more are a cluttered room
@@ -195,7 +195,7 @@ class OpenDoorRule(Rule[OpenDoorParameters]):
         if len(ring) < _MIN_ROWS:
             return _Side(Line(place, place / np.hypot(*place)), has_extent=False)
         # Every place counts once: more pixels see a reveal head-on than a wall at a slant.
-        places = thin(ring, _VOXEL_M)
+        places = voxel_downsample(ring, _VOXEL_M)
         fit = strongest_line(places, p.support_m)
         if fit is None:
             return None

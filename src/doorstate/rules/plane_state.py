@@ -10,7 +10,7 @@ import numpy as np
 
 from doorstate.rules.base import Parameters, Rule, RuleResult, state_by_angle
 from doorstate.rules.plan_lines import Floats, angle_deg
-from doorstate.rules.planes import Plane, component_numbers, normals, thin, upright_plane
+from doorstate.rules.planes import Plane, component_numbers, normals, upright_plane, voxel_downsample
 from doorstate.rules.walls import (
     WallParameters,
     covered_length_m,
@@ -89,7 +89,7 @@ class PlaneStateRule(Rule[PlaneStateParameters]):
         points, _ = nearby_points(cloud, p.farthest_m)
         if len(points) < p.min_points:
             return RuleResult.abstain("too few points")
-        points = thin(points, p.voxel_m)
+        points = voxel_downsample(points, p.voxel_m)
         surfaces = self._surfaces(points)
         if not surfaces:
             return RuleResult.abstain("no upright plane")

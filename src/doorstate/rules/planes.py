@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Upright planes in clouds, and thinning, normals and connected components of points."""
+"""Upright planes in clouds, and voxels, normals and connected components of points."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def upright_plane(points: Floats, threshold_m: float, *, seed: int = 0) -> tuple
     return Plane(normal, float(line.normal @ line.centre)), on_line
 
 
-def thin(points: Floats, voxel_m: float) -> Floats:
+def voxel_downsample(points: Floats, voxel_m: float) -> Floats:
     """Return the mean point of every occupied voxel (PCL's VoxelGrid); remove far points first, voxels are counted."""
     return grid(points, voxel_m)[1] if len(points) else points
 

@@ -18,9 +18,9 @@ import numpy as np
 from pydantic import Field
 
 from doorstate.rules.base import Detection, Parameters, Rule, RuleResult, measured_points
-from doorstate.rules.floor_plan import FloorPlan, azimuth_rad, floor_plan, plan_lines
+from doorstate.rules.floor_plan import FloorPlan, azimuth_rad, floor_plan, strongest_lines
 from doorstate.rules.plan_lines import Floats, Line, fit_line
-from doorstate.rules.planes import thin
+from doorstate.rules.planes import voxel_downsample
 from doorstate.rules.wall_columns import Gap, WallColumns, wall_columns
 from doorstate.types import DoorState, Points
 
@@ -85,7 +85,7 @@ class WallLeafAngleRule(Rule[WallLeafAngleParameters]):
             return RuleResult.abstain(
                 f"too few points: {len(points)} of use, at least {_MIN_POINTS} are needed"
             )
-        points = thin(points, p.voxel_m)
+        points = voxel_downsample(points, p.voxel_m)
         plan = floor_plan(points, p.cell_m, p.upright_m)
         results = [self._wall_result(line, plan, points) for line in self._wall_lines(plan, points)]
         if not results:
@@ -101,7 +101,7 @@ class WallLeafAngleRule(Rule[WallLeafAngleParameters]):
         view = azimuth_rad(points)
         borders_rad = np.array([view.min(), view.max()])
         long, cut = [], []
-        for line, on_line in plan_lines(plan.centres_m, plan.heights_m, p.line_m):
+        for line, on_line in strongest_lines(plan.centres_m, plan.heights_m, p.line_m):
             places = plan.centres_m[on_line]
             along_m = line.along_m(places)
             length_m = float(np.ptp(along_m))
@@ -178,7 +178,7 @@ class WallLeafAngleRule(Rule[WallLeafAngleParameters]):
         # Somewhat farther than a leaf reaches: a side wall must not be cut to a leaf's length.
         off_wall = (off_m > p.in_front_m) & (off_m <= 1.5 * longest_m) & (plan.tops_m >= p.leaf_top_m)
         cells = plan.centres_m[off_wall]
-        for rough, on_line in plan_lines(cells, plan.heights_m[off_wall], p.line_m):
+        for rough, on_line in strongest_lines(cells, plan.heights_m[off_wall], p.line_m):
             start_m, end_m = _longest_run(rough.along_m(cells[on_line]), _LEAF_GAP_CELLS * p.cell_m)
             if not p.leaf_length_m[0] <= end_m - start_m <= longest_m:
                 continue

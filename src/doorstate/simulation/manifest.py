@@ -14,6 +14,8 @@ from pydantic import ValidationError
 from doorstate.errors import DatasetError, first_validation_error
 from doorstate.simulation.row import Row
 
+MANIFEST_FILE = "manifest.csv"
+
 
 def flatten(row: Row) -> dict[str, str]:
     """Return columns and their text in the order of the fields; None is an empty text."""

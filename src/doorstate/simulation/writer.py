@@ -22,12 +22,11 @@ from doorstate._jobs import Progress, Shard, default_workers, no_progress, piece
 from doorstate.errors import ConfigError, DatasetError, first_validation_error
 from doorstate.io.pcd import write_pcd
 from doorstate.simulation.frames import Frame
-from doorstate.simulation.manifest import flatten
+from doorstate.simulation.manifest import MANIFEST_FILE, flatten
 from doorstate.simulation.row import Row
 from doorstate.simulation.settings import RawKind, SimulationSettings
 from doorstate.simulation.shading import shade
 
-MANIFEST = "manifest.csv"
 _SETTINGS = "simulation.json"
 _PIECES = "pieces"
 _POSES_PER_PIECE = 8
@@ -66,7 +65,7 @@ def simulate_dataset(
         ConfigError: the folder holds something else.
     """
     pieces, paths = _claim(folder, settings, callback)
-    manifest, scratch = folder / MANIFEST, folder / _PIECES
+    manifest, scratch = folder / MANIFEST_FILE, folder / _PIECES
     if manifest.exists():
         shutil.rmtree(scratch, ignore_errors=True)
         progress(1, 1)
@@ -95,10 +94,12 @@ def simulate_shard(
         ConfigError: the folder holds something else.
     """
     pieces, paths = _claim(folder, settings, callback)
-    if (folder / MANIFEST).exists():
+    if (folder / MANIFEST_FILE).exists():
         progress(1, 1)
         return
-    run_pieces(_simulate_piece, shard.of(pieces), shard.of(paths), workers or default_workers(), progress)
+    run_pieces(
+        _simulate_piece, shard.select(pieces), shard.select(paths), workers or default_workers(), progress
+    )
 
 
 def read_settings(folder: Path) -> SimulationSettings:

@@ -19,8 +19,8 @@ from doorstate.io.find import find_clouds
 from doorstate.io.options import DEFAULT_OPTIONS, ReadOptions
 from doorstate.io.readers import read_cloud
 from doorstate.simulation.frames import replay
-from doorstate.simulation.manifest import unflatten
-from doorstate.simulation.writer import MANIFEST, is_simulated
+from doorstate.simulation.manifest import MANIFEST_FILE, unflatten
+from doorstate.simulation.writer import is_simulated
 from doorstate.types import Points
 
 
@@ -53,9 +53,9 @@ def find_named_clouds(
             dataset = open_dataset(path)
             readers += [partial(_read_sample, dataset, index) for index in range(len(dataset))]
         elif is_simulated(path):
-            if not (path / MANIFEST).is_file():
+            if not (path / MANIFEST_FILE).is_file():
                 raise DatasetError("the simulation is not complete", path=path)
-            readers += [partial(_replay_row, row) for row in read_csv(path / MANIFEST)]
+            readers += [partial(_replay_row, row) for row in read_csv(path / MANIFEST_FILE)]
         else:
             files += find_clouds([path])
     parent = os.path.commonpath([file.absolute().parent for file in files]) if files else ""

@@ -30,7 +30,7 @@ class Outputs(NamedTuple):
     probabilities: NDArray[np.float32]  # (B, 3), calibrated
     heads: Columns  # (B,) each, by column of the manifest, metres and degrees in the sensor frame
 
-    def of_clouds(self) -> list[CloudOutputs]:
+    def per_cloud(self) -> list[CloudOutputs]:
         """Return the outputs of every cloud."""
         return [
             CloudOutputs(row, {name: float(column[number]) for name, column in self.heads.items()})
@@ -65,5 +65,5 @@ def run_by_size(backend: Backend, clouds: Sequence[Points]) -> list[CloudOutputs
     for size in sorted({len(cloud) for cloud in clouds}):
         numbers = [number for number, cloud in enumerate(clouds) if len(cloud) == size]
         batch = backend(np.stack([clouds[number] for number in numbers]))
-        outputs.update(zip(numbers, batch.of_clouds(), strict=True))
+        outputs.update(zip(numbers, batch.per_cloud(), strict=True))
     return [outputs[number] for number in range(len(clouds))]
