@@ -10,7 +10,7 @@ from doorstate._files import write_csv
 from doorstate.dataset.store import open_dataset
 from doorstate.evaluation.comparison import Results
 from doorstate.evaluation.predictions import load_results, save_results
-from doorstate.evaluation.study import load_study, save_study
+from doorstate.evaluation.study import load_study_results, save_study_results
 from doorstate.simulation.manifest import MANIFEST_FILE
 
 from . import paths
@@ -25,8 +25,8 @@ def publish(name: str) -> Path:
     """
     source, target = paths.RUNS / name, paths.RESULTS / name
     if read_definition(name).is_study:
-        study = load_study(source)
-        save_study(study, target)
+        study = load_study_results(source)
+        save_study_results(study, target)
         publish_datasets(study.parts.values())
     else:
         results = load_results(source)

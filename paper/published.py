@@ -7,7 +7,7 @@ from functools import cache
 
 from doorstate.evaluation.comparison import Results
 from doorstate.evaluation.predictions import join_results, load_results
-from doorstate.evaluation.study import Study, load_study
+from doorstate.evaluation.study import StudyResults, load_study_results
 
 from . import paths
 
@@ -29,6 +29,6 @@ def joined(name: str) -> Results:
 
 
 @cache
-def study(name: str) -> Study:
+def study(name: str) -> StudyResults:
     """Return a published study."""
-    return load_study(paths.RESULTS / name)
+    return load_study_results(paths.RESULTS / name)

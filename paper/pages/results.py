@@ -13,7 +13,7 @@ from doorstate.evaluation.calibration import score_calibration
 from doorstate.evaluation.comparison import Results
 from doorstate.evaluation.method_scores import MACRO, score_states, summarize_methods
 from doorstate.evaluation.resolution import score_resolution
-from doorstate.evaluation.study import Study
+from doorstate.evaluation.study import StudyResults
 from doorstate.evaluation.table import (
     Column,
     Table,
@@ -166,7 +166,7 @@ def authors_table(authors: Results, common: Results) -> Table:
     return Table.from_frame("Recipes of the authors", pd.DataFrame(rows), columns)
 
 
-def points_table(resolution: Study) -> Table:
+def points_table(resolution: StudyResults) -> Table:
     """Build the table of macro F1 by number of points, as trained and fine-tuned, and of two latencies."""
     scores = score_resolution(resolution)
     counts = sorted(scores["points"].unique())

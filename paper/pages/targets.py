@@ -46,7 +46,7 @@ class Target:
         title: metric and unit.
         samples: samples in words.
         bound: least value, or greatest if `at_most`.
-        chosen: rows of `Results.frame` that count.
+        chosen: rows of `Results.joined` that count.
         measure: of a network on these rows.
         results: comparison that holds them.
     """
@@ -209,8 +209,8 @@ def targets_frame(networks: Sequence[str]) -> pd.DataFrame:
     rows = []
     for target in TARGETS:
         results = target.results()
-        first = results.frame[
-            (results.frame["method"] == results.networks[0]) & (results.frame["role"] == "test")
+        first = results.joined[
+            (results.joined["method"] == results.networks[0]) & (results.joined["role"] == "test")
         ]
         measured = {
             name: target.measure(results, name, target.chosen) if name in results.networks else Measured()

@@ -102,7 +102,7 @@ def test_scores_count_the_predictions(results: FrameResults) -> None:
 
 
 def test_the_frame_joins_predictions_with_the_index(results: FrameResults) -> None:
-    frame = results.frame
+    frame = results.joined
     assert len(frame) == 10
     first = frame.iloc[0]
     assert (first["sample_id"], first["method"], first["door"]) == ("closed.pcd", "net", "wood")
@@ -116,7 +116,7 @@ def test_a_column_of_the_index_does_not_replace_a_prediction(
     predictors: Predictors, labelled: list[LabelledFrame]
 ) -> None:
     frame = replace(labelled[0], columns={"predicted": "open", "p_open": "1", "note": "kept"})
-    (row,) = evaluate_frames({"plane_state": predictors["plane_state"]}, [frame]).frame.to_dict("records")
+    (row,) = evaluate_frames({"plane_state": predictors["plane_state"]}, [frame]).joined.to_dict("records")
     assert (row["predicted"], row["p_closed"], row["note"]) == ("closed", 1, "kept")
 
 

@@ -10,7 +10,7 @@ import pytest
 from doorstate._files import write_csv
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import DatasetError
-from doorstate.evaluation.manifest import manifest_frame, number_column, read_manifest, text_column
+from doorstate.evaluation.manifest import manifest_frame, number_values, read_manifest, text_values
 
 ROWS = [
     {"sample_id": "1", "state": "open", "distance_m": "2.5", "region": "red", "scene_id": "007"},
@@ -24,13 +24,13 @@ def test_columns_with_a_unit_are_numbers() -> None:
     assert frame["distance_m"].dtype == "float64"
     assert frame["distance_m"].isna().tolist() == [False, True]
     assert frame["scene_id"].tolist() == ["007", "008"]
-    assert text_column(frame, "region").tolist() == ["red", ""]
+    assert text_values(frame, "region").tolist() == ["red", ""]
 
 
 def test_absent_columns_are_missing_throughout() -> None:
     frame = manifest_frame(ROWS)
-    assert number_column(frame, "camera_height_m").isna().all()
-    assert text_column(frame, "sensor").tolist() == ["", ""]
+    assert number_values(frame, "camera_height_m").isna().all()
+    assert text_values(frame, "sensor").tolist() == ["", ""]
 
 
 def test_numbers_are_read_exactly(simulated: PreparedDataset) -> None:

@@ -50,7 +50,7 @@ def test_frame_joins_predictions_with_the_manifest(
     folder = make_comparison(simulated)
     path = _predictions(folder)
     _edit(path, lambda lines: [f"{lines[0]},opening_angle_deg", *(f"{line},12.5" for line in lines[1:])])
-    frame = load_results(folder).frame
+    frame = load_results(folder).joined
     row = frame[(frame["method"] == "pointnet") & (frame["fold"] == 0)].iloc[0]
     manifest = simulated.rows[simulated.index_of(row["sample_id"])]
     assert row["opening_angle_deg_predicted"] == 12.5
@@ -103,7 +103,7 @@ def test_head_outputs_add_columns_and_samples_without_a_door(
     tested = [name for name, role in read_splits(folder / "splits.csv")[0].items() if role == "test"]
     path.write_text("".join(["sample_id,p_door\n", *(f"{name},0.25\n" for name in tested)]))
     results = load_results(folder)
-    rows = results.frame[(results.frame["method"] == "dgcnn") & (results.frame["fold"] == 0)]
+    rows = results.joined[(results.joined["method"] == "dgcnn") & (results.joined["fold"] == 0)]
     assert (rows["p_door"] == 0.25).all()
     without = rows[rows["state"] == "no_door"]
     assert len(without) == 4

@@ -19,7 +19,7 @@ from doorstate.evaluation.resolution import (
     score_resolution,
     write_resolution,
 )
-from doorstate.evaluation.study import LATENCY, Study, load_study
+from doorstate.evaluation.study import LATENCY, StudyResults, load_study_results
 from tests.evaluation.conftest import MakeComparison
 
 
@@ -43,14 +43,14 @@ def add_part(
 def test_each_kind_of_weights_has_its_column(add_part: Callable[..., Path], tmp_path: Path) -> None:
     add_part("as-trained-128", 4)
     folder = add_part("as-trained-256", 0)
-    scores = score_resolution(load_study(folder))
+    scores = score_resolution(load_study_results(folder))
     assert scores["points"].tolist() == [128, 256]
     assert scores["as_trained"][0] < scores["as_trained"][1] == 1
     assert scores[["fine_tuned", "milliseconds"]].isna().all(axis=None)
     assert len(resolution_table(scores).columns) == 4
     add_part("fine-tuned-128", 2)
     write_csv(folder / LATENCY, [{"network": "pointnet", "points": "256", "median_ms": "7.25"}])
-    study = load_study(folder)
+    study = load_study_results(folder)
     coarse, fine = score_resolution(study).to_dict("records")
     assert coarse["as_trained"] < coarse["fine_tuned"] < 1
     assert np.isnan(fine["fine_tuned"])
@@ -63,13 +63,13 @@ def test_each_kind_of_weights_has_its_column(add_part: Callable[..., Path], tmp_
 
 def test_a_study_without_a_finished_part_is_refused() -> None:
     with pytest.raises(RunError):
-        score_resolution(Study({}))
+        score_resolution(StudyResults({}))
 
 
 def test_a_part_counts_once_all_its_folds_are_finished(add_part: Callable[..., Path]) -> None:
     add_part("as-trained-128", 0)
     folder = add_part("fine-tuned-128", 4, [("pointnet", 4)])
-    assert score_resolution(load_study(folder))["fine_tuned"].isna().all()
+    assert score_resolution(load_study_results(folder))["fine_tuned"].isna().all()
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from pandas.testing import assert_frame_equal
 
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import RunError
-from doorstate.evaluation.study import load_study, save_study
+from doorstate.evaluation.study import load_study_results, save_study_results
 from tests.evaluation.conftest import MakeComparison
 
 
@@ -32,16 +32,16 @@ def folder(simulated: PreparedDataset, make_comparison: MakeComparison, tmp_path
 
 
 def test_published_form_holds_the_same_and_is_deterministic(folder: Path, tmp_path: Path) -> None:
-    study = load_study(folder)
+    study = load_study_results(folder)
     published = tmp_path / "published" / "study"
-    save_study(study, published)
+    save_study_results(study, published)
     assert {path.name for path in published.iterdir()} == {
         "experiment.json",
         "metrics.json",
         "splits.csv.gz",
         "predictions.csv.gz",
     }
-    again = load_study(published)
+    again = load_study_results(published)
     assert list(again.parts) == list(study.parts) == ["few/angles", "many"]
     assert again.latencies_ms == study.latencies_ms == {("pointnet", 256): 7.25}
     for name, results in study.parts.items():
@@ -50,7 +50,7 @@ def test_published_form_holds_the_same_and_is_deterministic(folder: Path, tmp_pa
         assert results.splits == again.parts[name].splits
         assert [run.metrics for run in results.runs] == [run.metrics for run in again.parts[name].runs]
     assert len(again.parts["few/angles"].errors) == 1
-    save_study(again, tmp_path / "again")
+    save_study_results(again, tmp_path / "again")
     for path in published.iterdir():
         assert path.read_bytes() == (tmp_path / "again" / path.name).read_bytes()
 
@@ -60,21 +60,21 @@ def test_comparisons_of_one_data_set_share_their_splits(folder: Path, tmp_path: 
     text = splits.read_text()
     splits.write_text(text.replace("val", "train", 1))
     with pytest.raises(RunError) as raised:
-        save_study(load_study(folder), tmp_path / "published" / "study")
+        save_study_results(load_study_results(folder), tmp_path / "published" / "study")
     assert raised.value.field == "dataset"
 
 
 def test_a_study_that_has_not_begun_is_refused(tmp_path: Path) -> None:
     with pytest.raises(RunError):
-        load_study(tmp_path)
+        load_study_results(tmp_path)
 
 
 def test_a_damaged_study_is_refused(folder: Path, tmp_path: Path) -> None:
     published = tmp_path / "published" / "study"
-    save_study(load_study(folder), published)
+    save_study_results(load_study_results(folder), published)
     document = json.loads((published / "metrics.json").read_text())
     del document["parts"]["many"]
     (published / "metrics.json").write_text(json.dumps(document))
     with pytest.raises(RunError) as raised:
-        load_study(published)
+        load_study_results(published)
     assert raised.value.path == published

@@ -11,7 +11,7 @@ import pytest
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import RunError
 from doorstate.evaluation.figures.transfer import transfer_figure
-from doorstate.evaluation.study import Study, load_study
+from doorstate.evaluation.study import StudyResults, load_study_results
 from doorstate.evaluation.table import UNDEFINED
 from doorstate.evaluation.transfer import score_transfer, transfer_grid, transfer_table, write_transfer
 from tests.evaluation.conftest import MakeComparison
@@ -54,7 +54,7 @@ def test_figure_has_the_numbers_of_the_table(scores: pd.DataFrame) -> None:
 
 def test_a_study_without_a_finished_part_is_refused() -> None:
     with pytest.raises(RunError):
-        score_transfer(Study({}), ("a",), ("x",))
+        score_transfer(StudyResults({}), ("a",), ("x",))
 
 
 def test_parts_of_a_study_are_scored(
@@ -63,7 +63,7 @@ def test_parts_of_a_study_are_scored(
     wrong = {"pointnet": {simulated.rows[0]["sample_id"]: "open"}}
     (tmp_path / "s" / "a").mkdir(parents=True)
     make_comparison(simulated, wrong, ("pointnet",)).rename(tmp_path / "s" / "a" / "x")
-    scores = score_transfer(load_study(tmp_path / "s"), ("a",), ("x", "y"))
+    scores = score_transfer(load_study_results(tmp_path / "s"), ("a",), ("x", "y"))
     (row,) = scores.to_dict("records")
     assert (row["method"], row["trained"], row["tested"], row["samples"]) == ("pointnet", "a", "x", 120)
     assert row["f1"] == pytest.approx(1 - 1 / 120, abs=1e-4)

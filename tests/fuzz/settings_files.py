@@ -69,7 +69,7 @@ def read_settings(data: bytes, name: str) -> str:
 
 def _load_published(_: Path) -> None:
     results = load_results(_FOLDER)
-    assert len(results.frame) >= len(results.tested) >= len(results.errors)
+    assert len(results.joined) >= len(results.tested) >= len(results.errors)
 
 
 def _read_experiment(path: Path) -> None:

@@ -15,7 +15,7 @@ from doorstate.dataset.splits import Role, read_splits, write_splits
 from doorstate.dataset.store import PreparedDataset, open_dataset
 from doorstate.errors import RunError
 from doorstate.evaluation.predictions import load_results
-from doorstate.evaluation.study import load_study
+from doorstate.evaluation.study import load_study_results
 from doorstate.training.comparison import compare
 from doorstate.training.experiment import Experiment
 
@@ -68,7 +68,7 @@ def test_a_comparison_and_its_tested_rows(folders: Path, small_dataset: Prepared
 def test_a_study(folders: Path, small_dataset: PreparedDataset) -> None:
     define(folders, "trial", f'dataset = "{small_dataset.folder}"\npoints = [128]\n')
     train(small_dataset, folders / "runs" / "trial" / "as-trained-128")
-    study = load_study(publish("trial"))
+    study = load_study_results(publish("trial"))
     assert list(study.parts) == ["as-trained-128"]
     assert len(study.parts["as-trained-128"].tested_by("pointnet")) == 6
 

@@ -55,7 +55,7 @@ def write_report(
         everything: show all frames on the page, not only errors.
     """
     name = folder.resolve().name
-    table = results.frame.drop(columns="correct").rename(columns={"sample_id": "file"})
+    table = results.joined.drop(columns="correct").rename(columns={"sample_id": "file"})
     write_text(out / "predictions.csv", table.to_csv(index=False, lineterminator="\n", float_format="%.5g"))
     metrics = {
         "doorstate": __version__,

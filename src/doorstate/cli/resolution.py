@@ -35,8 +35,7 @@ def resolution(
     from doorstate.cli.compare import compare_with_display
     from doorstate.cli.console import print_table
     from doorstate.evaluation.resolution import resolution_table, score_resolution, write_resolution
-    from doorstate.evaluation.study import LATENCY
-    from doorstate.evaluation.study import load_study as load_study_results
+    from doorstate.evaluation.study import LATENCY, load_study_results
     from doorstate.training.resolution import ResolutionStudy
     from doorstate.training.study import load_study
 

@@ -29,7 +29,7 @@ def transfer(
     """
     from doorstate.cli.compare import compare_with_display
     from doorstate.cli.console import print_table, stdout
-    from doorstate.evaluation.study import load_study as load_study_results
+    from doorstate.evaluation.study import load_study_results
     from doorstate.evaluation.transfer import score_transfer, transfer_table, write_transfer
     from doorstate.training.study import load_study
     from doorstate.training.transfer import TransferStudy

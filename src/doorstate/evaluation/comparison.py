@@ -111,7 +111,7 @@ class Results:
         return Counter(self.splits[fold].values())
 
     @cached_property
-    def frame(self) -> pd.DataFrame:
+    def joined(self) -> pd.DataFrame:
         """Predictions joined with their manifest; predicted values of a manifest's columns end in `_predicted`.
 
         Column `correct` tells whether the predicted state is the true one.
@@ -120,8 +120,8 @@ class Results:
 
     @cached_property
     def tested(self) -> pd.DataFrame:
-        """Rows of `frame` with a door that were tested; pooled over folds, every sample at most once a method."""
-        return self.frame[(self.frame["role"] == "test") & (self.frame["state"] != NO_DOOR)]
+        """Rows of `joined` with a door that were tested; pooled over folds, every sample at most once a method."""
+        return self.joined[(self.joined["role"] == "test") & (self.joined["state"] != NO_DOOR)]
 
     def tested_by(self, method: str) -> pd.DataFrame:
         """Return the rows of `tested` of a method."""
@@ -147,12 +147,12 @@ class Results:
 
 
 def predicted_column(name: str) -> str:
-    """Return the column of `Results.frame` with the predicted value of a manifest's column."""
+    """Return the column of `Results.joined` with the predicted value of a manifest's column."""
     return f"{name}_predicted"
 
 
 def join_manifest(predictions: pd.DataFrame, manifest: pd.DataFrame) -> pd.DataFrame:
-    """Join predictions with a manifest indexed by `sample_id`, as `Results.frame` describes."""
+    """Join predictions with a manifest indexed by `sample_id`, as `Results.joined` describes."""
     measured = [
         column
         for column in predictions.columns

@@ -6,7 +6,7 @@ from __future__ import annotations
 import pandas as pd
 
 from doorstate.evaluation.comparison import PROBABILITY_COLUMNS, Results
-from doorstate.evaluation.manifest import number_column, text_column
+from doorstate.evaluation.manifest import number_values, text_values
 from doorstate.evaluation.undecidable import is_undecidable
 from doorstate.types import PREDICTED_LABELS, STATES
 
@@ -45,7 +45,7 @@ def summarize_errors(results: Results) -> pd.DataFrame:
                 ]
                 if kind.empty:
                     continue
-                regions = text_column(kind, "region")
+                regions = text_values(kind, "region")
                 counts = regions[regions != ""].value_counts().sort_index()
                 row: dict[str, object] = {
                     "method": method,
@@ -55,7 +55,7 @@ def summarize_errors(results: Results) -> pd.DataFrame:
                     "regions": ", ".join(f"{count} {region}" for region, count in counts.items()),
                 }
                 for name in RANGES:
-                    values = number_column(kind, name)
+                    values = number_values(kind, name)
                     row |= {
                         f"{name}_min": values.min(),
                         f"{name}_median": values.median(),

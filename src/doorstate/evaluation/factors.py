@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from doorstate.evaluation.comparison import Results
-from doorstate.evaluation.manifest import number_column, text_column
+from doorstate.evaluation.manifest import number_values, text_values
 from doorstate.evaluation.metrics import Floats
 from doorstate.types import Indices
 
@@ -24,13 +24,13 @@ class Factor(NamedTuple):
 
 
 def _column(name: str) -> Callable[[pd.DataFrame], pd.Series[float]]:
-    return lambda frame: number_column(frame, name)
+    return lambda frame: number_values(frame, name)
 
 
 def _heading_offset_deg(frame: pd.DataFrame) -> pd.Series[float]:
     """Return the heading relative to the door's middle in degrees, to the left of it positive."""
-    bearing_deg = np.degrees(np.arctan2(-number_column(frame, "y_m"), -number_column(frame, "x_m")))
-    difference = number_column(frame, "heading_deg") - bearing_deg
+    bearing_deg = np.degrees(np.arctan2(-number_values(frame, "y_m"), -number_values(frame, "x_m")))
+    difference = number_values(frame, "heading_deg") - bearing_deg
     # As math.remainder: to the nearest multiple, so that the result lies within 180 degrees.
     offset: pd.Series[float] = difference - 360 * (difference / 360).round()
     return offset
@@ -55,7 +55,7 @@ FACTORS = (
     Factor(OCCLUSION, _column("occluded_share"), (0, 0.01, 0.25, 0.5, 0.75, 1)),
     Factor(
         SHARE,
-        lambda frame: 100 * number_column(frame, "opening_share"),
+        lambda frame: 100 * number_values(frame, "opening_share"),
         (0, 3, 11.5, 20, 35, 50, 65, 72.5, 80, 90, 100),
     ),
 )
@@ -95,17 +95,17 @@ def _bins(values: Floats, edges: tuple[float, ...]) -> Indices:
 
 def _sensor_and_preset(frame: pd.DataFrame) -> pd.Series[str]:
     """Return sensor and preset: one sensor may have seen the scenes of several presets."""
-    preset = text_column(frame, "scene_id").str.rsplit("-", n=2).str[0]  # of PRESET-SEED-INDEX
-    sensor = text_column(frame, "sensor")
+    preset = text_values(frame, "scene_id").str.rsplit("-", n=2).str[0]  # of PRESET-SEED-INDEX
+    sensor = text_values(frame, "sensor")
     return sensor.where((sensor == "") | (preset == ""), sensor + ", " + preset)
 
 
 KINDS: dict[str, Callable[[pd.DataFrame], pd.Series[str]]] = {
-    "door_kind": lambda frame: text_column(frame, "door_kind"),
-    "swing": lambda frame: text_column(frame, "swing"),
+    "door_kind": lambda frame: text_values(frame, "door_kind"),
+    "swing": lambda frame: text_values(frame, "swing"),
     "sensor, preset": _sensor_and_preset,
-    "occluded_bin": lambda frame: text_column(frame, "occluded_bin"),
-    "ambiguous": lambda frame: text_column(frame, "ambiguous"),
+    "occluded_bin": lambda frame: text_values(frame, "occluded_bin"),
+    "ambiguous": lambda frame: text_values(frame, "ambiguous"),
 }
 """Kinds of samples: a name, and the value of each row, "" where the manifest does not record it."""
 

@@ -15,7 +15,7 @@ from doorstate.dataset.labelled import LabelledFrame, check_column
 from doorstate.errors import DoorstateError
 from doorstate.evaluation.comparison import TEXT_COLUMNS, join_manifest
 from doorstate.evaluation.frame_scores import FrameScores, score_frames
-from doorstate.evaluation.manifest import text_column
+from doorstate.evaluation.manifest import text_values
 from doorstate.inference.abstention import Abstention
 from doorstate.inference.prediction import Prediction
 from doorstate.inference.predictor import Predictor
@@ -53,8 +53,8 @@ class FrameResults:
         return table.astype({name: "str" for name in table if name in TEXT_COLUMNS})
 
     @cached_property
-    def frame(self) -> pd.DataFrame:
-        """Predictions joined with the columns of the index, as `Results.frame` is with a manifest.
+    def joined(self) -> pd.DataFrame:
+        """Predictions joined with the columns of the index, as `Results.joined` is with a manifest.
 
         On a frame without a clear door an abstention is `correct`.
         """
@@ -67,7 +67,7 @@ class FrameResults:
 
     def misclassified_by(self, number: int) -> list[str]:
         """Return the methods that misclassified a frame, or predicted a state where there is no clear door."""
-        rows = self.frame[self.frame["sample_id"] == self.frames[number].file]
+        rows = self.joined[self.joined["sample_id"] == self.frames[number].file]
         return rows.loc[~rows["correct"], "method"].tolist()
 
     def score(self, group: str | None = None, by: Sequence[str] = ()) -> FrameScores:
@@ -82,15 +82,15 @@ class FrameResults:
         """
         for name in (*by, *([group] if group else ())):
             check_column(self.frames, name.partition(":")[0])
-        file = self.frame["sample_id"]
-        groups = file if group is None else text_column(self.frame, group)
+        file = self.joined["sample_id"]
+        groups = file if group is None else text_values(self.joined, group)
         # A frame without a group is a group of its own; no value of a column starts as these do.
         groups = groups.where(groups != "", "/" + file)
-        return score_frames(self.frame, groups, {name: self._stratum(name) for name in by})
+        return score_frames(self.joined, groups, {name: self._stratum(name) for name in by})
 
     def _stratum(self, name: str) -> pd.Series[str]:
         column, colon, word = name.partition(":")
-        values = text_column(self.frame, column)
+        values = text_values(self.joined, column)
         if not colon:
             return values.where(values != "", "unknown")
         contains = values.str.contains(word, case=False, regex=False)

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from doorstate.evaluation.comparison import KEY_COLUMNS, RULE_COLUMNS, Results, predicted_column
-from doorstate.evaluation.manifest import number_column, text_column
+from doorstate.evaluation.manifest import number_values, text_values
 from doorstate.networks.heads import HEADS, POINT_HEADS, head_metrics
 from doorstate.types import DECISION_THRESHOLD, NO_DOOR, PARTS, STATES
 
@@ -20,7 +20,7 @@ def head_rows(results: Results, method: str) -> pd.DataFrame | None:
     """Return the test rows of a network's head outputs, with samples without a door; None if it has no such heads."""
     if method not in results.networks:
         return None
-    own = results.frame[(results.frame["method"] == method) & (results.frame["role"] == "test")]
+    own = results.joined[(results.joined["method"] == method) & (results.joined["role"] == "test")]
     names = [name for name in map(str, results.predictions) if name not in (*KEY_COLUMNS, *RULE_COLUMNS)]
     columns = [name if name in own else predicted_column(name) for name in names if name.startswith("p_")]
     columns += [predicted_column(name) for name in (*names, "opening_angle_deg") if not name.startswith("p_")]
@@ -60,8 +60,8 @@ def score_presence(results: Results) -> pd.DataFrame:
     """Count how often a network predicts a door: columns method, door (bool), kind, samples, predicted_door, share."""
     rows = []
     for method, outputs in _with_presence(results):
-        kinds = text_column(outputs, "door_kind")
-        kinds = kinds.where(kinds != "", text_column(outputs, "scene_kind"))
+        kinds = text_values(outputs, "door_kind")
+        kinds = kinds.where(kinds != "", text_values(outputs, "scene_kind"))
         is_door, predicted_door = outputs["state"] != NO_DOOR, outputs["p_door"] >= DECISION_THRESHOLD
         for door in (True, False):
             for kind in sorted(set(kinds[is_door == door])):
@@ -117,5 +117,5 @@ def _with_heads(results: Results) -> Iterator[tuple[str, pd.DataFrame]]:
 
 def _with_presence(results: Results) -> Iterator[tuple[str, pd.DataFrame]]:
     for method, rows in _with_heads(results):
-        if number_column(rows, "p_door").notna().any():
+        if number_values(rows, "p_door").notna().any():
             yield method, rows

@@ -50,11 +50,11 @@ def manifest_frame(rows: Sequence[Mapping[str, str]]) -> pd.DataFrame:
     return frame.set_index("sample_id", drop=False)
 
 
-def number_column(frame: pd.DataFrame, name: str) -> pd.Series[float]:
+def number_values(frame: pd.DataFrame, name: str) -> pd.Series[float]:
     """Return a column of numbers, NaN throughout where the manifest does not have it."""
     return frame[name] if name in frame else pd.Series(math.nan, index=frame.index, dtype="float64")
 
 
-def text_column(frame: pd.DataFrame, name: str) -> pd.Series[str]:
+def text_values(frame: pd.DataFrame, name: str) -> pd.Series[str]:
     """Return a column of text, "" where a field is empty or the manifest does not have the column."""
     return frame[name].fillna("") if name in frame else pd.Series("", index=frame.index, dtype="str")

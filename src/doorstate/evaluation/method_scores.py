@@ -10,7 +10,7 @@ import pandas as pd
 
 from doorstate.evaluation.comparison import Results
 from doorstate.evaluation.intervals import F1Intervals, Interval, bootstrap_f1, bounds, wilson_interval
-from doorstate.evaluation.manifest import text_column
+from doorstate.evaluation.manifest import text_values
 from doorstate.evaluation.metrics import Floats, confusion, macro_f1, mean_and_deviation, ratio, scores
 from doorstate.types import ABSTAINED, PREDICTED_LABELS, STATES
 
@@ -36,7 +36,7 @@ def confusion_counts(results: Results) -> pd.DataFrame:
 def f1_intervals(results: Results, method: str) -> F1Intervals:
     """Return bootstrap intervals of a method's F1; poses are drawn as a whole where the data set has poses."""
     tested = results.tested_by(method)
-    pose = text_column(tested, "pose_id")
+    pose = text_values(tested, "pose_id")
     # One seed for all methods: they are compared under the same resamples.
     generator = np.random.default_rng(results.config.seed)
     return bootstrap_f1(tested, pose.where(pose != "", tested["sample_id"]), generator)

@@ -34,7 +34,6 @@ def write_report(
     out: Path,
     dataset: Path | None = None,
     folds: int | None = None,
-    dataset_figures: Mapping[str, bytes] | None = None,
 ) -> Path:
     """Write `tables/`, `figures/` and `report.html`; the same inputs give the same bytes.
 
@@ -43,7 +42,6 @@ def write_report(
         out: made if absent.
         dataset: data set folder, if it was moved.
         folds: number of first folds to show; all if not given.
-        dataset_figures: output of `draw_dataset_figures`, if they are drawn already.
 
     Returns:
         The page.
@@ -53,15 +51,13 @@ def write_report(
         DatasetError: its data set or splits cannot be used.
     """
     results = join_results([load_results(folder, dataset, folds) for folder in folders])
-    return write_results_report(results, out, dataset_figures)
+    return write_results_report(results, out)
 
 
-def write_results_report(
-    results: Results, out: Path, dataset_figures: Mapping[str, bytes] | None = None
-) -> Path:
+def write_results_report(results: Results, out: Path) -> Path:
     """Write the report of loaded results as `write_report` does."""
     prepared = open_dataset(results.dataset_folder)
-    tables, figures = build_tables(results), draw_figures(results, prepared, dataset_figures)
+    tables, figures = build_tables(results), draw_figures(results, prepared)
     save_tables(tables, out / "tables")
     save_figures(figures, out / "figures")
     page = out / "report.html"

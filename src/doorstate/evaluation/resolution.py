@@ -13,7 +13,7 @@ from doorstate.errors import RunError
 from doorstate.evaluation.figures.encode import encode_figures, save_figures
 from doorstate.evaluation.figures.resolution import resolution_figure
 from doorstate.evaluation.metrics import macro_f1
-from doorstate.evaluation.study import Study
+from doorstate.evaluation.study import StudyResults
 from doorstate.evaluation.table import Table, count_column, label_column, number_column
 from doorstate.evaluation.tables import save_tables
 from doorstate.training.run_folder import AS_TRAINED, FINE_TUNED
@@ -21,7 +21,7 @@ from doorstate.training.run_folder import AS_TRAINED, FINE_TUNED
 _COLUMNS = {AS_TRAINED: "as_trained", FINE_TUNED: "fine_tuned"}
 
 
-def score_resolution(study: Study) -> pd.DataFrame:
+def score_resolution(study: StudyResults) -> pd.DataFrame:
     """Score every network and number of points of a study.
 
     Networks that have not finished all folds of a part are left out of it.
@@ -110,7 +110,7 @@ def resolution_table(scores: pd.DataFrame) -> Table:
     )
 
 
-def write_resolution(study: Study, out: Path) -> Path:
+def write_resolution(study: StudyResults, out: Path) -> Path:
     """Write the table and the figure of a study into `tables/` and `figures/` of a folder, made if absent."""
     scores = score_resolution(study)
     save_tables({"resolution": resolution_table(scores)}, out / "tables")

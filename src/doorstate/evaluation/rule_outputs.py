@@ -7,7 +7,7 @@ import pandas as pd
 
 from doorstate.dataset.strata import REGIONS
 from doorstate.evaluation.comparison import Results
-from doorstate.evaluation.manifest import number_column, text_column
+from doorstate.evaluation.manifest import number_values, text_values
 from doorstate.evaluation.metrics import ratio
 from doorstate.evaluation.strata import ALL
 from doorstate.types import ABSTAINED
@@ -24,9 +24,9 @@ def score_angles(results: Results) -> pd.DataFrame:
         tested = results.tested_by(method)
         if tested["opening_angle_deg_predicted"].isna().all():
             continue
-        truth = number_column(tested, "opening_angle_deg")
+        truth = number_values(tested, "opening_angle_deg")
         error = (tested["opening_angle_deg_predicted"] - truth).abs()
-        counted, region = (tested["state"] != "closed") & truth.notna(), text_column(tested, "region")
+        counted, region = (tested["state"] != "closed") & truth.notna(), text_values(tested, "region")
         for name in (*REGIONS, ALL):
             chosen = error[counted & ((region == name) | (name == ALL))]
             if len(chosen):

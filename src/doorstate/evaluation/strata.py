@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from doorstate.dataset.strata import BANDS, REGIONS
 from doorstate.evaluation.comparison import Results
-from doorstate.evaluation.manifest import text_column
+from doorstate.evaluation.manifest import text_values
 from doorstate.evaluation.metrics import confusion_cells, label_codes, scores
 from doorstate.types import NO_DOOR, PREDICTED_LABELS, STATES, Indices
 
@@ -69,7 +69,7 @@ def score_strata(results: Results, state: str) -> pd.DataFrame:
 
 
 def _in_strata(frame: pd.DataFrame) -> pd.Series[bool]:
-    return text_column(frame, "region").isin(list(REGIONS)) & text_column(frame, "distance_band").isin(BANDS)
+    return text_values(frame, "region").isin(list(REGIONS)) & text_values(frame, "distance_band").isin(BANDS)
 
 
 def _count(frame: pd.DataFrame, codes: ArrayLike, num_codes: int) -> Indices:

@@ -36,7 +36,7 @@ LATENCY = "latency.csv"
 
 
 @dataclass(frozen=True, eq=False)
-class Study:
+class StudyResults:
     """Comparisons of a study by their folder below it, such as `mixture/cluttered`."""
 
     parts: Mapping[str, Results]
@@ -44,7 +44,7 @@ class Study:
     """Median time from a raw cloud to a state, by network and number of points."""
 
 
-def load_study(folder: Path) -> Study:
+def load_study_results(folder: Path) -> StudyResults:
     """Load the finished comparisons of a study, from its run folders or its published form.
 
     Raises:
@@ -57,13 +57,13 @@ def load_study(folder: Path) -> Study:
     if not finished:
         raise RunError("no finished comparison of a study", path=folder)
     rows = read_csv(folder / LATENCY) if (folder / LATENCY).is_file() else []
-    return Study(
+    return StudyResults(
         {path.relative_to(folder).as_posix(): load_results(path) for path in finished},
         {(row["network"], int(row["points"])): float(row["median_ms"]) for row in rows},
     )
 
 
-def save_study(study: Study, folder: Path) -> None:
+def save_study_results(study: StudyResults, folder: Path) -> None:
     """Write a study in its published form.
 
     Args:
@@ -86,7 +86,7 @@ def save_study(study: Study, folder: Path) -> None:
     write_predictions(table[["part", *table.columns.drop("part")]], folder / PREDICTIONS)
 
 
-def _write_splits(study: Study, path: Path) -> None:
+def _write_splits(study: StudyResults, path: Path) -> None:
     by_dataset: dict[str, Results] = {}
     for results in study.parts.values():
         same = by_dataset.setdefault(results.config.dataset, results)
@@ -102,7 +102,7 @@ def _write_splits(study: Study, path: Path) -> None:
     write_csv(path, rows)
 
 
-def _load_published(folder: Path) -> Study:
+def _load_published(folder: Path) -> StudyResults:
     document, metrics = read_json(folder / EXPERIMENT), read_json(folder / METRICS)
     path = folder / PREDICTIONS
     tables = dict(iter(read_predictions(path).groupby("part", sort=False)))
@@ -116,7 +116,7 @@ def _load_published(folder: Path) -> Study:
         latencies_ms = {(network, int(points)): float(ms) for network, points, ms in document["latencies_ms"]}
     except (KeyError, TypeError, ValueError) as error:
         raise RunError(f"is no published study ({error!r})", path=folder) from error
-    return Study(parts, latencies_ms)
+    return StudyResults(parts, latencies_ms)
 
 
 def _read_splits(path: Path) -> dict[str, tuple[dict[str, Any], ...]]:

@@ -12,12 +12,12 @@ from doorstate.errors import RunError
 from doorstate.evaluation.figures.encode import encode_figures, save_figures
 from doorstate.evaluation.figures.transfer import transfer_figure
 from doorstate.evaluation.metrics import macro_f1
-from doorstate.evaluation.study import Study
+from doorstate.evaluation.study import StudyResults
 from doorstate.evaluation.table import Table, label_column, number_column
 from doorstate.evaluation.tables import save_tables
 
 
-def score_transfer(study: Study, trained: Sequence[str], tested: Sequence[str]) -> pd.DataFrame:
+def score_transfer(study: StudyResults, trained: Sequence[str], tested: Sequence[str]) -> pd.DataFrame:
     """Score every pair of a study that is finished.
 
     Args:

@@ -6,7 +6,7 @@ from __future__ import annotations
 import pandas as pd
 
 from doorstate.evaluation.comparison import Results
-from doorstate.evaluation.manifest import text_column
+from doorstate.evaluation.manifest import text_values
 from doorstate.evaluation.metrics import accuracy, confusion, ratio
 from doorstate.evaluation.strata import ALL
 from doorstate.types import STATES
@@ -14,12 +14,12 @@ from doorstate.types import STATES
 
 def is_undecidable(frame: pd.DataFrame) -> pd.Series[bool]:
     """Return for each row of a manifest, or joined with one, whether another state of its pose looks the same."""
-    return text_column(frame, "same_image_as") != ""
+    return text_values(frame, "same_image_as") != ""
 
 
 def records_twins(manifest: pd.DataFrame) -> bool:
     """Tell whether the data set records which frames are undecidable."""
-    return "same_image_as" in manifest and bool((text_column(manifest, "pose_id") != "").any())
+    return "same_image_as" in manifest and bool((text_values(manifest, "pose_id") != "").any())
 
 
 def decidable_ceiling(frame: pd.DataFrame) -> float:

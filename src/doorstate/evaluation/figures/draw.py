@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from matplotlib.figure import Figure
 
 from doorstate.dataset.store import PreparedDataset
@@ -20,15 +18,12 @@ from doorstate.evaluation.figures.scores import confusion_figure, spread_figure
 from doorstate.evaluation.manifest import manifest_frame
 
 
-def draw_figures(
-    results: Results, dataset: PreparedDataset, of_dataset: Mapping[str, bytes] | None = None
-) -> dict[str, bytes]:
+def draw_figures(results: Results, dataset: PreparedDataset) -> dict[str, bytes]:
     """Draw every figure as a PNG, by the name of its file.
 
     Args:
         results: a checked comparison.
         dataset: data set of the comparison.
-        of_dataset: output of `draw_dataset_figures`, if they are drawn already.
     """
     figures: dict[str, Figure | None] = {
         "confusion": confusion_figure(results),
@@ -40,10 +35,7 @@ def draw_figures(
         "errors_in_plan": errors_figure(results),
         "factors": factors_figure(results),
     }
-    return {
-        **(draw_dataset_figures(dataset) if of_dataset is None else of_dataset),
-        **encode_figures(figures),
-    }
+    return draw_dataset_figures(dataset) | encode_figures(figures)
 
 
 def draw_dataset_figures(dataset: PreparedDataset) -> dict[str, bytes]:
