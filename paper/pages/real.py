@@ -19,6 +19,7 @@ from doorstate.evaluation.table import (
     label_column,
     number_column,
 )
+from doorstate.evaluation.views import STATE_WORDS
 from doorstate.training.run_folder import read_json
 from doorstate.types import ABSTAINED, STATES
 
@@ -44,7 +45,7 @@ def content() -> Mapping[str, Any]:
 def read_frames() -> pd.DataFrame:
     """Read the predictions on recorded frames: one row for each method and frame.
 
-    `method` is a rule, or the experiment whose PointNet++ answered; `door` names what frames depend on.
+    `method` is a rule, or the experiment that trained the PointNet++; frames of one `door` depend on each other.
     """
     frame = pd.read_csv(FOLDER / "predictions.csv.gz", keep_default_na=False, na_values=[""])
     return frame.assign(correct=frame["predicted"] == frame["state"])
@@ -81,12 +82,7 @@ def scores_table(scores: pd.DataFrame, weights: list[Mapping[str, Any]]) -> Tabl
         return titles.get(name, name if " " in name else f"`{name}`")
 
     columns = (
-        Column(
-            "method",
-            ("method",),
-            lambda name: titles.get(name, name if " " in name else f"`{name}`"),
-            is_label=True,
-        ),
+        Column("method", ("method",), title, is_label=True),
         count_column("correct"),
         count_column("wrong"),
         count_column("abstained"),
@@ -112,6 +108,6 @@ def confusion_table(predictions: pd.DataFrame, method: str) -> Table:
     )
     columns = (
         label_column("state", "true state"),
-        *(count_column(name, name.replace("_", "-")) for name in counts.columns),
+        *(count_column(name, STATE_WORDS[name]) for name in counts.columns),
     )
     return Table.from_frame("PointNet++, newest weights", counts.reset_index(), columns)

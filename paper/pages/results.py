@@ -24,7 +24,9 @@ from doorstate.evaluation.table import (
     number,
     number_column,
 )
+from doorstate.evaluation.views import STATE_WORDS
 from doorstate.training.recipes import AUTHORS
+from doorstate.types import STATES
 
 from ..paths import TITLES
 from ..published import comparison, study
@@ -32,7 +34,8 @@ from .cases import accuracy_by_case, count_error_kinds
 from .places import place_cases
 
 TARGET_F1, TARGET_UNSEEN_F1 = 0.995, 0.99  # of every network; of the best one on unseen poses
-EXPERIMENTS = ("paper", "by-pose", "by-pose-mirrored", "authors", "related")
+_PROTOCOLS = ("paper", "by-pose", "by-pose-mirrored")
+EXPERIMENTS = (*_PROTOCOLS, "authors", "related")
 
 
 def method_column(title: str = "network") -> Column:
@@ -42,8 +45,8 @@ def method_column(title: str = "network") -> Column:
 
 def content() -> Mapping[str, Any]:
     """Return the values of the page."""
-    paper, by_pose, mirrored = (comparison(name) for name in ("paper", "by-pose", "by-pose-mirrored"))
-    summaries = {name: summary(comparison(name)) for name in ("paper", "by-pose", "by-pose-mirrored")}
+    paper, by_pose, mirrored = (comparison(name) for name in _PROTOCOLS)
+    summaries = {name: summary(comparison(name)) for name in _PROTOCOLS}
     states = score_states(paper)
     scores = states[states["state"] != MACRO][["precision", "recall", "f1"]]
     best = {name: frame.sort_values("f1").iloc[-1] for name, frame in summaries.items()}
@@ -87,16 +90,13 @@ def summary_table(results: Results) -> Table:
         number_column("f1", "macro F1"),
         interval_column("f1", "95 %"),
         deviation_column("f1", "over folds"),
-        *(number_column(f"recall_{state}", f"recall {title}") for state, title in _STATES.items()),
+        *(number_column(f"recall_{state}", f"recall {STATE_WORDS[state]}") for state in STATES),
     )
     note = (
         f"{frame['samples'].iloc[0]} test samples, pooled over {results.config.folds} folds. 95 %: bootstrap over "
         "poses. Over folds: mean and standard deviation."
     )
     return Table.from_frame("Scores", frame, columns, note)
-
-
-_STATES = {"closed": "closed", "semi_open": "semi-open", "open": "open"}
 
 
 def calibration_table(results: Results) -> Table:
@@ -112,10 +112,7 @@ def calibration_table(results: Results) -> Table:
 
 def protocols_table(summaries: Mapping[str, pd.DataFrame]) -> Table:
     """Build the table of macro F1 and errors of each network under both protocols."""
-    paper, by_pose, mirrored = (
-        summaries[name].set_index("method")[["f1", "errors"]]
-        for name in ("paper", "by-pose", "by-pose-mirrored")
-    )
+    paper, by_pose, mirrored = (summaries[name].set_index("method")[["f1", "errors"]] for name in _PROTOCOLS)
     frame = paper.add_suffix("_paper").join([by_pose.add_suffix("_unseen"), mirrored.add_suffix("_mirrored")])
     columns = (
         method_column(),
@@ -151,7 +148,8 @@ def authors_table(authors: Results, common: Results) -> Table:
     rows = [
         {
             "method": run.method,
-            "epochs": f"{len(run.log)} of {AUTHORS[run.method].epochs}",
+            "epochs": len(run.log),
+            "published_epochs": AUTHORS[run.method].epochs,
             "authors": run.metric("test_macro_f1"),
             "common": scores[run.method, run.fold],
         }
@@ -159,7 +157,9 @@ def authors_table(authors: Results, common: Results) -> Table:
     ]
     columns = (
         method_column(),
-        Column("epochs", ("epochs",), str),
+        Column(
+            "epochs", ("epochs", "published_epochs"), lambda epochs, all_epochs: f"{epochs} of {all_epochs}"
+        ),
         number_column("authors", "macro F1, authors' recipe"),
         number_column("common", "macro F1, common recipe"),
     )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Targets for the weights of the mixture, and the figures that networks reach."""
+"""Targets for the weights of the mixture, and the values that networks reach."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ _Z95 = 1.96  # standard errors to either side of a 95 % interval
 
 
 @dataclass(frozen=True)
-class Measured:
-    """Figure of a network, and half of its 95 % interval where samples are few."""
+class Estimate:
+    """Value of a metric for a network, and half of its 95 % interval where samples are few."""
 
     value: float = math.nan
     margin: float = 0.0
@@ -43,38 +43,40 @@ class Target:
     """Bound for a metric on some samples.
 
     Attributes:
-        title: metric and unit.
-        samples: samples in words.
+        metric: name and unit of the metric.
+        samples: description of the samples.
         bound: least value, or greatest if `at_most`.
-        chosen: rows of `Results.joined` that count.
-        measure: of a network on these rows.
-        results: comparison that holds them.
+        chosen: selects the rows of `Results.joined` that count.
+        measure: evaluates a network on these rows.
+        at_most: the bound is the greatest value.
+        digits: decimals that are printed.
+        results: returns the comparison that holds the rows.
     """
 
-    title: str
+    metric: str
     samples: str
     bound: float
     chosen: Case
-    measure: Callable[[Results, str, Case], Measured]
+    measure: Callable[[Results, str, Case], Estimate]
     at_most: bool = False
     digits: int = 1
     results: Callable[[], Results] = _mixture
 
-    def reached(self, measured: Measured) -> bool:
-        """Return whether a figure meets the bound; NaN does not."""
-        return measured.value <= self.bound if self.at_most else measured.value >= self.bound
+    def is_reached(self, estimate: Estimate) -> bool:
+        """Return True if a value meets the bound; NaN does not."""
+        return estimate.value <= self.bound if self.at_most else estimate.value >= self.bound
 
-    def undecided(self, measured: Measured) -> bool:
-        """Return whether the bound lies within the interval of a figure."""
-        return abs(measured.value - self.bound) < measured.margin
+    def is_undecided(self, estimate: Estimate) -> bool:
+        """Return True if the bound lies within the interval of a value."""
+        return abs(estimate.value - self.bound) < estimate.margin
 
 
-def _noisy(rows: pd.DataFrame) -> pd.Series[bool]:
+def _seen_by_xtion(rows: pd.DataFrame) -> pd.Series[bool]:
     return (rows["sensor"] == "xtion") & rows["pose_id"].str.startswith("varied-") & _is_door(rows)
 
 
-def _noisy_decidable(rows: pd.DataFrame) -> pd.Series[bool]:
-    return _noisy(rows) & ~is_undecidable(rows)
+def _seen_by_xtion_decidable(rows: pd.DataFrame) -> pd.Series[bool]:
+    return _seen_by_xtion(rows) & ~is_undecidable(rows)
 
 
 def _any(rows: pd.DataFrame) -> pd.Series[bool]:
@@ -93,28 +95,28 @@ def _has_hinge(rows: pd.DataFrame) -> pd.Series[bool]:
     return rows["hinge"].fillna("") != ""
 
 
-def _macro_f1(results: Results, network: str, chosen: Case) -> Measured:
+def _macro_f1(results: Results, network: str, chosen: Case) -> Estimate:
     tested = results.tested_by(network)
     rows = tested[chosen(tested)]
-    return Measured(macro_f1(rows)) if len(rows) else Measured()
+    return Estimate(macro_f1(rows)) if len(rows) else Estimate()
 
 
-def _accuracy_lost(results: Results, network: str, chosen: Case) -> Measured:
+def _accuracy_lost(results: Results, network: str, chosen: Case) -> Estimate:
     """Return how many points of accuracy doors lose that are hidden by up to a quarter."""
     tested = results.tested_by(network)
     rows = tested[chosen(tested)]
     free, hidden = (rows.loc[rows["occluded_bin"] == name, "correct"].astype(float) for name in ("0", "0-25"))
     if free.empty or hidden.empty:
-        return Measured()
+        return Estimate()
     margin = _Z95 * math.sqrt(free.var(ddof=0) / len(free) + hidden.var(ddof=0) / len(hidden))
-    return Measured(100 * (free.mean() - hidden.mean()), 100 * margin)
+    return Estimate(100 * (free.mean() - hidden.mean()), 100 * margin)
 
 
-def _calibration_error(results: Results, network: str, chosen: Case) -> Measured:
+def _calibration_error(results: Results, network: str, chosen: Case) -> Estimate:
     calibration = calibrate(results, network)
     if calibration is None:
-        return Measured()
-    return Measured(100 * reliability(calibration.true, calibration.scaled).error)
+        return Estimate()
+    return Estimate(100 * reliability(calibration.true, calibration.scaled).error)
 
 
 def _head(
@@ -123,9 +125,9 @@ def _head(
     results: Results,
     network: str,
     chosen: Case,
-) -> Measured:
+) -> Estimate:
     rows = head_rows(results, network)
-    return Measured() if rows is None else Measured(factor * head_errors(rows)[name])
+    return Estimate() if rows is None else Estimate(factor * head_errors(rows)[name])
 
 
 def _at_4096() -> Results:
@@ -144,17 +146,17 @@ TARGETS = (
         _F1,
         "`varied` doors seen by an Xtion, 4096 points",
         0.97,
-        _noisy,
+        _seen_by_xtion,
         _macro_f1,
         digits=4,
         results=_at_4096,
     ),
-    Target(_F1, "the same doors, 1024 points", 0.97, _noisy, _macro_f1, digits=4),
+    Target(_F1, "the same doors, 1024 points", 0.97, _seen_by_xtion, _macro_f1, digits=4),
     Target(
         _F1,
         "decidable ones, 1024 points",
         0.97,
-        lambda rows: _noisy(rows) & ~is_undecidable(rows),
+        _seen_by_xtion_decidable,
         _macro_f1,
         digits=4,
     ),
@@ -162,7 +164,7 @@ TARGETS = (
         "AUROC of a door",
         "all samples",
         0.99,
-        lambda rows: rows["state"].notna(),
+        _any,
         partial(_head, "door_auroc", 1),
         digits=4,
     ),
@@ -188,7 +190,7 @@ TARGETS = (
         "doors",
         8,
         _is_door,
-        partial(_head, "frame_position_error_median_m", 100),
+        _POSITION,
         at_most=True,
     ),
     Target(
@@ -196,7 +198,7 @@ TARGETS = (
         "doors",
         4,
         _is_door,
-        partial(_head, "frame_yaw_error_median_deg", 1),
+        _YAW,
         at_most=True,
     ),
     Target(_LOST, "`cluttered`, Kinect", 3, _cluttered, _accuracy_lost, at_most=True),
@@ -205,44 +207,56 @@ TARGETS = (
 
 
 def targets_frame(networks: Sequence[str]) -> pd.DataFrame:
-    """Return a row for each target: its texts, the number of samples, and a `Measured` for each network."""
+    """Evaluate every network on every target.
+
+    Returns:
+        A row for each target, with columns metric, samples, count (of samples), bound, at_most, digits, reached and
+        undecided (lists of networks), and for each network its value and `<network>_margin`.
+    """
     rows = []
     for target in TARGETS:
         results = target.results()
         first = results.joined[
             (results.joined["method"] == results.networks[0]) & (results.joined["role"] == "test")
         ]
-        measured = {
-            name: target.measure(results, name, target.chosen) if name in results.networks else Measured()
+        estimates = {
+            name: target.measure(results, name, target.chosen) if name in results.networks else Estimate()
             for name in networks
         }
-        met = [TITLES[name] for name in networks if target.reached(measured[name])]
-        unsure = [TITLES[name] for name in networks if target.undecided(measured[name])]
         rows.append(
             {
-                "title": target.title,
-                "samples": f"{target.samples} ({int(target.chosen(first).sum())})",
-                "bound": f"{'≤' if target.at_most else '≥'} {target.bound:g}",
-                "reached": (", ".join(met) or "none") + (f"; unsure: {', '.join(unsure)}" if unsure else ""),
+                "metric": target.metric,
+                "samples": target.samples,
+                "count": int(target.chosen(first).sum()),
+                "bound": target.bound,
+                "at_most": target.at_most,
                 "digits": target.digits,
-                **measured,
+                "reached": [name for name in networks if target.is_reached(estimates[name])],
+                "undecided": [name for name in networks if target.is_undecided(estimates[name])],
+                **{name: estimate.value for name, estimate in estimates.items()},
+                **{f"{name}_margin": estimate.margin for name, estimate in estimates.items()},
             }
         )
     return pd.DataFrame(rows)
 
 
 def targets_table(networks: Sequence[str]) -> Table:
-    """Build the table of targets and of what every network reaches."""
+    """Build the table of targets and of the values that every network reaches."""
     columns = (
-        label_column("title", "metric"),
-        label_column("samples"),
-        Column("target", ("bound",), str),
-        *(Column(TITLES[name], (name, "digits"), _cell) for name in networks),
-        Column("reached by", ("reached",), str),
+        label_column("metric"),
+        Column("samples", ("samples", "count"), lambda samples, count: f"{samples} ({count})", is_label=True),
+        Column("target", ("bound", "at_most"), lambda bound, at_most: f"{'≤' if at_most else '≥'} {bound:g}"),
+        *(Column(TITLES[name], (name, f"{name}_margin", "digits"), _estimate) for name in networks),
+        Column("reached by", ("reached", "undecided"), _reached_by),
     )
     return Table.from_frame("Targets", targets_frame(networks), columns)
 
 
-def _cell(measured: Measured, digits: int) -> str:
-    text = number(measured.value, digits)
-    return f"{text} ± {measured.margin:.{digits}f}" if measured.margin else text
+def _estimate(value: float, margin: float, digits: int) -> str:
+    text = number(value, digits)
+    return f"{text} ± {margin:.{digits}f}" if margin else text
+
+
+def _reached_by(reached: Sequence[str], undecided: Sequence[str]) -> str:
+    names, unsure = (", ".join(TITLES[name] for name in networks) for networks in (reached, undecided))
+    return (names or "none") + (f"; unsure: {unsure}" if unsure else "")

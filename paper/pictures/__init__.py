@@ -11,6 +11,8 @@ from pathlib import Path
 from PIL import Image
 
 from doorstate._files import atomic_path
+from doorstate.evaluation.figures.factors import factors_figure
+from doorstate.evaluation.figures.poses import errors_figure
 
 from .. import paths
 from . import reports, scenes, sensors, states, view
@@ -24,9 +26,9 @@ PICTURES: Mapping[str, Callable[[], bytes]] = {
     "no-door": partial(scenes.draw, "no-door"),
     "sensors": sensors.draw,
     "view": view.draw,
-    "results-by-pose-errors": partial(reports.draw, "by-pose", "errors_in_plan"),
-    "related-factors": partial(reports.draw, "related", "factors"),
-    "generalization-factors": partial(reports.draw, "mixture-wide", "factors"),
+    "results-by-pose-errors": partial(reports.draw, "by-pose", "errors_in_plan", errors_figure),
+    "related-factors": partial(reports.draw, "related", "factors", factors_figure),
+    "generalization-factors": partial(reports.draw, "mixture-wide", "factors", factors_figure),
 }
 """Functions that return a picture as PNG, by the name of its file."""
 

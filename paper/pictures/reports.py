@@ -1,16 +1,24 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figures of rendered reports."""
+"""Figures of published comparisons."""
 
 from __future__ import annotations
 
-import tempfile
-from pathlib import Path
+from collections.abc import Callable
 
-from ..report import write_published_report
+from matplotlib.figure import Figure
+
+from doorstate.evaluation.comparison import Results
+from doorstate.evaluation.figures.encode import encode_figures
+
+from ..published import joined
 
 
-def draw(experiment: str, figure: str) -> bytes:
-    """Return a figure of the report of a published experiment as PNG."""
-    with tempfile.TemporaryDirectory() as folder:
-        write_published_report(experiment, Path(folder))
-        return (Path(folder) / "figures" / f"{figure}.png").read_bytes()
+def draw(experiment: str, name: str, draw_figure: Callable[[Results], Figure | None]) -> bytes:
+    """Return one figure of a published comparison as PNG, as in its report.
+
+    Args:
+        experiment: name of the comparison.
+        name: file of the figure in the report, without its suffix.
+        draw_figure: function that draws it.
+    """
+    return encode_figures({name: draw_figure(joined(experiment))})[name]

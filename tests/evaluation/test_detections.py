@@ -38,8 +38,8 @@ def test_a_damaged_line_is_an_error(tmp_path: Path, line: str) -> None:
 def test_lines_pass_through_the_projected_points() -> None:
     axis = Figure().subplots()
     corners = np.array([[2.0, 1, 0], [2, -1, 0], [2, -1, 1]])
-    shapes = [("leaf", corners), ("edge", corners[:2]), ("corner", corners[:1])]
-    draw_detections(axis, [Detection(name, points) for name, points in shapes])
+    detections = [("leaf", corners), ("edge", corners[:2]), ("corner", corners[:1])]
+    draw_detections(axis, [Detection(name, points) for name, points in detections])
     outline, edge, corner = axis.lines
     screen, _ = oblique_view(corners.astype(np.float32))
     np.testing.assert_allclose(outline.get_xydata(), [*screen, screen[0]])  # closed

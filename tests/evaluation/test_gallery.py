@@ -80,7 +80,7 @@ def test_cards_carry_the_detections_of_a_rule(
         folder, "dgcnn", "open/3", [["wall", [[2, 1, 0], [2, -1, 0], [2, -1, 1]]], ["corner", [[1, 0, 0]]]]
     )
     gallery = build_gallery(load_results(folder), imported)
-    outline, corner = gallery.shapes["open/3"]["dgcnn"]
+    outline, corner = gallery.detections["open/3"]["dgcnn"]
     assert outline == {"name": "wall", "points": [[2, 1, 0], [2, -1, 0], [2, -1, 1], [2, 1, 0]]}  # closed
     assert corner == {"name": "corner", "points": [[1, 0, 0]]}
 

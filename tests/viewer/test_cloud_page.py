@@ -45,7 +45,7 @@ def test_entry_holds_the_input_points_of_the_network(
 
 def test_entries_without_parts_state_or_cloud(entries: list[Entry]) -> None:
     unnamed, glass, broken = entries[2:]
-    assert (unnamed["cloud"]["parts"], unnamed["truth"], unnamed["shapes"]) == (None, "", [])
+    assert (unnamed["cloud"]["parts"], unnamed["truth"], unnamed["detections"]) == (None, "", [])
     assert glass["prediction"]["state"] is None
     assert glass["prediction"]["reason"]
     assert "channels" not in glass, "the gate abstained, so that no network was used"
@@ -56,7 +56,9 @@ def test_entry_of_a_rule_holds_its_detections(clouds: list[NamedCloud]) -> None:
     rule = RulePredictor.from_name("plane_state")
     entry = make_entry(rule, clouds[1])
     detections = rule(clouds[1].cloud).detections  # type: ignore[arg-type]
-    assert [shape["name"] for shape in entry["shapes"]] == [shape.name for shape in detections]
+    assert [detection["name"] for detection in entry["detections"]] == [
+        detection.name for detection in detections
+    ]
     assert len(detections) > 0
     assert "channels" not in entry
     assert len(decoded(entry["cloud"]["points"], "<i2")) == 3 * 4096

@@ -27,6 +27,7 @@ from doorstate.types import NO_DOOR, STATES, Indices, Points
 CLOUDS_FILE, PARTS_FILE, DESCRIPTION_FILE = "clouds.npy", "parts.npy", "dataset.json"
 _LABELS = (*STATES, NO_DOOR)
 _CACHED_CLOUDS = 512
+_CACHED_IMAGES = 64  # a megabyte each
 _T = TypeVar("_T")
 
 
@@ -73,6 +74,7 @@ class PreparedDataset:
         self._parts = parts
         self._sampled: dict[int, tuple[Points, NDArray[np.uint8]]] = {}
         self._rendered: dict[int, Frame] = {}
+        self._shaded: dict[int, NDArray[np.uint8]] = {}
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -186,7 +188,10 @@ class PreparedDataset:
         """Render a shaded picture (H, W, 3), or return None for imported clouds."""
         if self.description.kind != "simulated":
             return None
-        return shade(self._frame(index).full, unflatten(self.rows[index]).camera.intrinsics())
+        if index not in self._shaded:
+            intrinsics = unflatten(self.rows[index]).camera.intrinsics()
+            _cache(self._shaded, index, shade(self._frame(index).full, intrinsics), _CACHED_IMAGES)
+        return self._shaded[index].copy()
 
 
 def _cache(cache: dict[int, _T], index: int, value: _T, size: int) -> None:

@@ -33,32 +33,35 @@ def read_detections(path: Path) -> Detections:
     for number, line in enumerate(path.read_text(encoding="utf-8").splitlines() if path.exists() else (), 1):
         try:
             record = json.loads(line)
-            sample, shapes = _LINE.validate_python((record["sample_id"], record["detections"]))
+            sample, detections = _LINE.validate_python((record["sample_id"], record["detections"]))
         except (ValueError, KeyError, TypeError, ValidationError) as error:
             raise RunError(
                 f"line {number} is not a record of detections", path=path, hint="run this rule again"
             ) from error
         detections[sample] = tuple(
-            Detection(name, np.array(points).reshape(-1, 3)) for name, points in shapes
+            Detection(name, np.array(points).reshape(-1, 3)) for name, points in detections
         )
     return detections
 
 
-def draw_detections(axis: Axes, shapes: Iterable[Detection]) -> None:
+def draw_detections(axis: Axes, detections: Iterable[Detection]) -> None:
     """Draw detections over a cloud: corners as dots, edges as lines, outlines closed."""
-    for shape in shapes:
-        screen, _ = oblique_view(closed(shape).astype(np.float32))
+    for detection in detections:
+        screen, _ = oblique_view(closed(detection).astype(np.float32))
         marker = "o" if len(screen) == 1 else ""
-        color = DETECTION_COLORS.get(shape.name, DETECTION_COLORS["edge"])
+        color = DETECTION_COLORS.get(detection.name, DETECTION_COLORS["edge"])
         axis.plot(*screen.T, marker=marker, markersize=3, linewidth=1.2, color=color, zorder=5)
 
 
-def encode_detections(shapes: Iterable[Detection]) -> list[dict[str, Any]]:
+def encode_detections(detections: Iterable[Detection]) -> list[dict[str, Any]]:
     """Encode detections for the page: name and points in metres, outlines closed."""
-    return [{"name": shape.name, "points": np.round(closed(shape), 3).tolist()} for shape in shapes]
+    return [
+        {"name": detection.name, "points": np.round(closed(detection), 3).tolist()}
+        for detection in detections
+    ]
 
 
-def closed(shape: Detection) -> Floats:
+def closed(detection: Detection) -> Floats:
     """Return the (K, 3) points of a detection; an outline ends where it starts."""
-    points = shape.points_m
+    points = detection.points_m
     return np.concatenate([points, points[:1]]) if len(points) > 2 else points

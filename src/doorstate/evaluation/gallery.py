@@ -33,7 +33,7 @@ class WrongPrediction:
 
 
 @dataclass(frozen=True)
-class Card:
+class SampleCard:
     """One sample that at least one method misclassified."""
 
     sample_id: str
@@ -48,25 +48,25 @@ class Card:
 class Gallery:
     """Cards, the clouds they show (encoded for the page), and the number of errors of each method left out."""
 
-    cards: tuple[Card, ...]
+    cards: tuple[SampleCard, ...]
     clouds: Mapping[str, Mapping[str, str | None]]
-    shapes: Mapping[str, Mapping[str, list[dict[str, Any]]]]  # by sample and method
+    detections: Mapping[str, Mapping[str, list[dict[str, Any]]]]  # by sample and method
     left_out: Mapping[str, int]
 
     @property
-    def groups(self) -> list[tuple[str, list[Card]]]:
+    def groups(self) -> list[tuple[str, list[SampleCard]]]:
         """Cards under headings: decidable samples by how many methods missed them, then the others."""
 
-        def heading(card: Card) -> str:
+        def heading(card: SampleCard) -> str:
             return "Undecidable" if card.undecidable else missed_by(len(card.predictions), len(self.left_out))
 
         return [(title, list(cards)) for title, cards in groupby(self.cards, heading)]
 
     @property
-    def shape_names(self) -> list[str]:
-        """Names of the shapes over all clouds."""
-        by_method = (shapes for methods in self.shapes.values() for shapes in methods.values())
-        return sorted({shape["name"] for shapes in by_method for shape in shapes})
+    def detection_names(self) -> list[str]:
+        """Names of the detections over all clouds."""
+        by_method = (detections for methods in self.detections.values() for detections in methods.values())
+        return sorted({detection["name"] for detections in by_method for detection in detections})
 
 
 def build_gallery(results: Results, dataset: PreparedDataset) -> Gallery:
@@ -86,18 +86,22 @@ def build_gallery(results: Results, dataset: PreparedDataset) -> Gallery:
         by_sample, key=lambda name: (by_sample[name]["undecidable"].iloc[0], -len(by_sample[name]))
     )
     left_out = errors["method"].value_counts().sub(kept["method"].value_counts(), fill_value=0)
+    cards, clouds = [], {}
+    for name in order:  # picture and cloud of a sample follow each other, so that it is replayed once
+        cards.append(_card(dataset, by_sample[name]))
+        clouds[name] = _encode_cloud(dataset, dataset.index_of(name))
     return Gallery(
-        cards=tuple(_card(dataset, by_sample[name]) for name in order),
-        clouds={name: _encode_cloud(dataset, dataset.index_of(name)) for name in order},
-        shapes={name: _shapes(results, name, by_sample[name]["method"]) for name in order},
+        cards=tuple(cards),
+        clouds=clouds,
+        detections={name: _detections(results, name, by_sample[name]["method"]) for name in order},
         left_out={method: int(left_out.get(method, 0)) for method in results.methods},
     )
 
 
-def _card(dataset: PreparedDataset, errors: pd.DataFrame) -> Card:
+def _card(dataset: PreparedDataset, errors: pd.DataFrame) -> SampleCard:
     first = errors.iloc[0]
     picture = dataset.image(dataset.index_of(first["sample_id"]))
-    return Card(
+    return SampleCard(
         first["sample_id"],
         first["state"],
         bool(first["undecidable"]),
@@ -116,9 +120,9 @@ def _card(dataset: PreparedDataset, errors: pd.DataFrame) -> Card:
     )
 
 
-def _shapes(results: Results, sample_id: str, methods: Iterable[str]) -> dict[str, list[dict[str, Any]]]:
-    detections = {method: results.detections.get(method, {}).get(sample_id, ()) for method in methods}
-    return {method: encode_detections(shapes) for method, shapes in detections.items() if shapes}
+def _detections(results: Results, sample_id: str, methods: Iterable[str]) -> dict[str, list[dict[str, Any]]]:
+    by_method = ((method, results.detections.get(method, {}).get(sample_id, ())) for method in methods)
+    return {method: encode_detections(detections) for method, detections in by_method if detections}
 
 
 def _facts(row: pd.Series[Any]) -> list[str]:

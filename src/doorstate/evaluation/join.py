@@ -56,5 +56,5 @@ def join_results(parts: Sequence[Results]) -> Results:
         first.splits,
         order_predictions(predictions[predictions["fold"] < folds], config),
         tuple(run for part in parts for run in part.runs if run.fold < folds),
-        {method: shapes for part in parts for method, shapes in part.detections.items()},
+        {method: detections for part in parts for method, detections in part.detections.items()},
     )

@@ -36,7 +36,7 @@ def render_page(template: str, package: str = "doorstate.evaluation", **values: 
     )
     style = {
         "parts": [{"value": part, "name": part.name.lower(), "color": PART_COLORS[part]} for part in Part],
-        "shape_colors": DETECTION_COLORS,
+        "detection_colors": DETECTION_COLORS,
         "elevation": VIEW_ELEVATION_RAD,
     }
     return environment.get_template(template).render(

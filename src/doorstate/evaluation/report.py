@@ -112,9 +112,9 @@ def render_report(
         words=STATE_WORDS,
         labels=predicted_labels(results),
         state_colors=STATE_COLORS,
-        shape_colors=DETECTION_COLORS,
+        detection_colors=DETECTION_COLORS,
         gallery=gallery,
-        page_data={"clouds": gallery.clouds, "shapes": gallery.shapes},
+        page_data={"clouds": gallery.clouds, "detections": gallery.detections},
     )
 
 

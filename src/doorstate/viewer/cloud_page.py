@@ -21,7 +21,7 @@ from doorstate.types import STATES, Points
 from doorstate.viewer.named_clouds import NamedCloud
 
 Entry = dict[str, Any]
-"""Cloud as the page gets it: `name` and `truth`, and either `error` or `prediction`, `cloud` and `shapes`."""
+"""Cloud as the page gets it: `name` and `truth`, and either `error` or `prediction`, `cloud` and `detections`."""
 
 CHANNEL_STEPS = 32  # a channel count is stored in steps of 1/32, so that two bytes hold 0 to 2047
 
@@ -54,7 +54,7 @@ def make_entry(
     return entry | {
         "prediction": prediction_to_dict(prediction, parameter),
         "cloud": encode_cloud(prepared.points[:NUM_POINTS], parts),
-        "shapes": encode_detections(prediction.detections),
+        "detections": encode_detections(prediction.detections),
     }
 
 

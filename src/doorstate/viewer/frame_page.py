@@ -151,13 +151,13 @@ def _groups(cards: Sequence[FrameCard], methods: int) -> list[tuple[str, list[Fr
 
 def _drawing(entry: Entry) -> Entry:
     """Return the fields of an entry that the script of the page draws."""
-    return {name: entry[name] for name in ("cloud", "shapes", "channels") if name in entry}
+    return {name: entry[name] for name in ("cloud", "detections", "channels") if name in entry}
 
 
 def _detection_colors(cards: Sequence[FrameCard]) -> dict[str, str]:
     """Return the colours of all detections on the cards, by name."""
     entries = [entry for card in cards for entry in card.entries.values()]
-    names = {shape["name"] for entry in entries for shape in entry.get("shapes", [])}
+    names = {detection["name"] for entry in entries for detection in entry.get("detections", [])}
     return {name: DETECTION_COLORS.get(name, DETECTION_COLORS["edge"]) for name in sorted(names)}
 
 

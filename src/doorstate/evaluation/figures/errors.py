@@ -34,8 +34,8 @@ def surest_errors_figure(results: Results, dataset: PreparedDataset) -> Figure |
             words = STATE_WORDS[error["state"]], STATE_WORDS[error["predicted"]]
             title = f"{words[0]} as {words[1]}, {error['confidence']:.2f}"
             _draw(axes[2 * line][column], axes[2 * line + 1][column], dataset, error["sample_id"], title)
-            shapes = results.detections.get(method, {}).get(error["sample_id"], ())
-            draw_detections(axes[2 * line + 1][column], shapes)
+            detections = results.detections.get(method, {}).get(error["sample_id"], ())
+            draw_detections(axes[2 * line + 1][column], detections)
     drawn = [sample for _, of_method in lines for sample in of_method["sample_id"].head(_COLUMNS)]
     part_legend(figure, dataset, map(dataset.index_of, drawn))
     return figure

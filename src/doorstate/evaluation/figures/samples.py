@@ -38,8 +38,8 @@ def samples_figure(dataset: PreparedDataset) -> Figure:
     regions: Sequence[str] = tuple(REGIONS) if has_strata(manifest) else ("",)
     chosen = [[_typical_sample(manifest, state, region) for region in regions] for state in STATES]
     indices = [index for line in chosen for index in line if index is not None]
-    pictures = {index: dataset.image(index) for index in indices}
-    lines_per_state = 2 if any(picture is not None for picture in pictures.values()) else 1
+    has_pictures = any(dataset.image(index) is not None for index in indices[:1])
+    lines_per_state = 2 if has_pictures else 1
     height = 1.75 * lines_per_state * len(STATES) + 0.4
     figure = Figure(figsize=(2.3 * len(regions) + 0.4, height), layout="constrained")
     axes = figure.subplots(lines_per_state * len(STATES), len(regions), squeeze=False)
@@ -61,7 +61,7 @@ def samples_figure(dataset: PreparedDataset) -> Figure:
                     color="gray",
                 )
                 continue
-            picture = pictures[index]
+            picture = dataset.image(index)
             if picture is not None:
                 axes[first, column].imshow(picture[::2, ::2], interpolation="none")
             draw_cloud(axes[first + lines_per_state - 1, column], dataset, index)

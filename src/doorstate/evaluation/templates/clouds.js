@@ -8,7 +8,7 @@ const clouds = (() => {
   const MUTED = "rgba(128,128,128,.45)";
   const HEAT = [[0, "#9aa3ae"], [0.3, "#f2b632"], [0.65, "#ee6a1f"], [1, "#d3114f"]];
   const pick = (values, members) => members.map((i) => values[i]);
-  const shapeColor = (name) => data.shape_colors[name] || data.shape_colors.edge;
+  const detectionColor = (name) => data.detection_colors[name] || data.detection_colors.edge;
 
   function decode({ points, parts }) {
     const raw = new DataView(bytes(points).buffer);
@@ -64,8 +64,8 @@ const clouds = (() => {
     line: { width: 5, color: ["#d62728", "#d62728", 0, "#2ca02c", "#2ca02c", 0, "#1f77b4", "#1f77b4"] },
   });
 
-  function shape({ name, points }, title) {
-    const color = shapeColor(name);
+  function detection({ name, points }, title) {
+    const color = detectionColor(name);
     return {
       type: "scatter3d", mode: points.length === 1 ? "markers" : "lines", name: title, hovertemplate: title,
       x: points.map((p) => p[0]), y: points.map((p) => p[1]), z: points.map((p) => p[2]),
@@ -108,7 +108,7 @@ const clouds = (() => {
   }
 
   // Draw a cloud on a canvas in the same oblique view, near points last.
-  function preview(canvas, cloud, colors, shapes) {
+  function preview(canvas, cloud, colors, detections) {
     const [down, level] = [Math.sin(data.elevation), Math.cos(data.elevation)];
     const [forward, right, up] = [[level, 0, -down], [0, -1, 0], [down, 0, level]];
     const along = (d) => Float32Array.from(cloud.x, (x, i) => x * d[0] + cloud.y[i] * d[1] + cloud.z[i] * d[2]);
@@ -138,8 +138,8 @@ const clouds = (() => {
       width / 2 + zoom * (dot(p, right) - (left + rightmost) / 2), height / 2 - zoom * (dot(p, up) - (bottom + top) / 2),
     ];
     pen.lineWidth = 1.5 * scale;
-    for (const { name, points } of shapes) {
-      pen.strokeStyle = pen.fillStyle = shapeColor(name);
+    for (const { name, points } of detections) {
+      pen.strokeStyle = pen.fillStyle = detectionColor(name);
       pen.beginPath();
       if (points.length === 1) pen.arc(...place(points[0]), 2.5 * scale, 0, 2 * Math.PI), pen.fill();
       else points.forEach((p, k) => (k ? pen.lineTo(...place(p)) : pen.moveTo(...place(p)))), pen.stroke();
@@ -155,13 +155,13 @@ const clouds = (() => {
     return window.Plotly;
   }
 
-  // Draw canvases when they come into view; `input(canvas)` returns { cloud, colors, shapes }.
+  // Draw canvases when they come into view; `input(canvas)` returns { cloud, colors, detections }.
   function previewWhenVisible(canvases, input) {
     const observer = new IntersectionObserver((changes) => {
       for (const { target } of changes.filter((change) => change.isIntersecting && change.target.clientWidth)) {
         observer.unobserve(target);
-        const { cloud, colors, shapes } = input(target);
-        preview(target, cloud, colors, shapes);
+        const { cloud, colors, detections } = input(target);
+        preview(target, cloud, colors, detections);
       }
     }, { rootMargin: "300px" });
     canvases.forEach((canvas) => observer.observe(canvas));
@@ -190,7 +190,7 @@ const clouds = (() => {
 
   const config = { displaylogo: false, responsive: true };
   return {
-    data, decode, byHeight, byPart, channelsOf, byChannels, partColors, heightColors, channelColors, camera, shape,
+    data, decode, byHeight, byPart, channelsOf, byChannels, partColors, heightColors, channelColors, camera, detection,
     previewWhenVisible, replaceByPlot, layout, plotly, config,
   };
 })();

@@ -25,20 +25,20 @@
   const decode = (sample) => clouds.decode(data.clouds[sample]);
 
   // Detections of rules in a sample: [method, { name, points }] in the order of the predictions.
-  const shapesOf = (sample) =>
-    Object.entries(data.shapes[sample]).flatMap(([method, shapes]) => shapes.map((shape) => [method, shape]));
+  const detectionsOf = (sample) =>
+    Object.entries(data.detections[sample]).flatMap(([method, detections]) => detections.map((detection) => [method, detection]));
 
   clouds.previewWhenVisible(document.querySelectorAll(".cloud canvas"), (canvas) => {
     const { sample } = canvas.closest(".card").dataset;
     const cloud = decode(sample);
     const colors = cloud.parts ? clouds.partColors(cloud) : clouds.heightColors(cloud);
-    return { cloud, colors, shapes: shapesOf(sample).map(([, shape]) => shape) };
+    return { cloud, colors, detections: detectionsOf(sample).map(([, detection]) => detection) };
   });
 
   function open(button) {
     const { sample } = button.closest(".card").dataset;
     const cloud = decode(sample);
-    const detections = shapesOf(sample).map(([method, shape]) => clouds.shape(shape, `${method}: ${shape.name}`));
+    const detections = detectionsOf(sample).map(([method, detection]) => clouds.detection(detection, `${method}: ${detection.name}`));
     const points = cloud.parts ? clouds.byPart(cloud) : clouds.byHeight(cloud);
     clouds.replaceByPlot(button, [...points, clouds.camera(), ...detections]);
   }

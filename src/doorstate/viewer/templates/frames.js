@@ -2,17 +2,17 @@
   const entryOf = (node) => clouds.data.cards[node.closest(".card").dataset.file][node.closest(".cloud").dataset.method];
 
   clouds.previewWhenVisible(document.querySelectorAll(".cloud canvas"), (canvas) => {
-    const { cloud: encoded, channels, shapes } = entryOf(canvas);
+    const { cloud: encoded, channels, detections } = entryOf(canvas);
     const cloud = clouds.decode(encoded);
     const colors = channels ? clouds.channelColors(clouds.channelsOf({ channels })) : clouds.heightColors(cloud);
-    return { cloud, colors, shapes };
+    return { cloud, colors, detections };
   });
 
   function open(button) {
     const entry = entryOf(button);
     const cloud = clouds.decode(entry.cloud);
     const points = entry.channels ? clouds.byChannels(cloud, clouds.channelsOf(entry)) : clouds.byHeight(cloud);
-    const detections = entry.shapes.map((shape) => clouds.shape(shape, shape.name));
+    const detections = entry.detections.map((detection) => clouds.detection(detection, detection.name));
     clouds.replaceByPlot(button.closest("figure"), [...points, clouds.camera(), ...detections]);
   }
 

@@ -29,7 +29,7 @@
     const cloud = clouds.decode(entry.cloud);
     const points = color === "part" ? clouds.byPart(cloud)
       : color === "channels" ? clouds.byChannels(cloud, clouds.channelsOf(entry)) : clouds.byHeight(cloud);
-    return [...points, clouds.camera(), ...entry.shapes.map((shape) => clouds.shape(shape, shape.name))];
+    return [...points, clouds.camera(), ...entry.detections.map((detection) => clouds.detection(detection, detection.name))];
   }
 
   const NOTES = {
