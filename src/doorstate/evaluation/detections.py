@@ -29,17 +29,17 @@ def read_detections(path: Path) -> Detections:
     Raises:
         RunError: a line is not a record of detections.
     """
-    detections = {}
+    detections: dict[str, tuple[Detection, ...]] = {}
     for number, line in enumerate(path.read_text(encoding="utf-8").splitlines() if path.exists() else (), 1):
         try:
             record = json.loads(line)
-            sample, detections = _LINE.validate_python((record["sample_id"], record["detections"]))
+            sample, shapes = _LINE.validate_python((record["sample_id"], record["detections"]))
         except (ValueError, KeyError, TypeError, ValidationError) as error:
             raise RunError(
                 f"line {number} is not a record of detections", path=path, hint="run this rule again"
             ) from error
         detections[sample] = tuple(
-            Detection(name, np.array(points).reshape(-1, 3)) for name, points in detections
+            Detection(name, np.array(points).reshape(-1, 3)) for name, points in shapes
         )
     return detections
 
