@@ -50,8 +50,9 @@ nitpick_ignore_regex = [
     ("py:.*", r"doorstate\.(simulation|dataset|training|evaluation|rules\.walls)\..*"),
     (
         "py:.*",
-        r"(doorstate\.rules\.base\.)?P|Points|Indices|Floats|Tensor|NDArray",
+        r"(doorstate\.rules\.base\.)?P|Points|Indices|Floats|Columns|Tensor|NDArray|Path|NoneType",
     ),  # type variables, and bare names in NamedTuples
+    ("py:class", r"FieldInfo|Ge|_PydanticGeneralMetadata"),  # constraints of pydantic
 ]
 
 REPOSITORY = Path(__file__).resolve().parents[1]

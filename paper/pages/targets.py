@@ -249,7 +249,8 @@ def targets_table(networks: Sequence[str]) -> Table:
         *(Column(TITLES[name], (name, f"{name}_margin", "digits"), _estimate) for name in networks),
         Column("reached by", ("reached", "undecided"), _reached_by),
     )
-    return Table.from_frame("Targets", targets_frame(networks), columns)
+    note = "±: half of the 95 % interval. Unsure: the interval contains the target."
+    return Table.from_frame("Targets", targets_frame(networks), columns, note)
 
 
 def _estimate(value: float, margin: float, digits: int) -> str:

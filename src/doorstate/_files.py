@@ -43,13 +43,13 @@ def check_writable(target: Path) -> None:
     """Check, before long work and without changing anything, that a file and its folders could be created.
 
     Raises:
-        OutputError: the target is a folder, or its nearest existing parent is no folder or not writable.
+        OutputError: the target is a folder, or its nearest existing parent is not a folder or not writable.
     """
     parent = next(folder for folder in target.absolute().parents if os.path.lexists(folder))
     if target.is_dir():
         reason = "it is a folder"
     elif not parent.is_dir():
-        reason = f"{parent} is no folder"
+        reason = f"{parent} is not a folder"
     elif not os.access(parent, os.W_OK):
         reason = f"{parent} is not writable"
     else:

@@ -25,7 +25,7 @@ def predictors(weights: Path) -> Predictors:
 
 
 def broken() -> Points:
-    raise CloudReadError("is no PCD file", path="d.pcd")
+    raise CloudReadError("is not a PCD file", path="d.pcd")
 
 
 @pytest.fixture(scope="module")

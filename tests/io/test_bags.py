@@ -326,7 +326,7 @@ def test_depth_images_without_a_camera_are_camera_errors(info: Message, reason: 
         (image("/t", DEPTH_MM, "16UC1", START_NS, step=15), "6 rows of 8 pixels"),
         (image("/t", DEPTH_MM, "16UC1", START_NS, height=0), "is damaged: 0 rows"),
         (image("/t", DEPTH_MM[:, :4], "16UC1", START_NS), "the image has 4 x 6 pixels"),
-        (compressed_image("/t", b"short", "16UC1; compressedDepth", START_NS), "is no PNG"),
+        (compressed_image("/t", b"short", "16UC1; compressedDepth", START_NS), "is not a PNG"),
         (
             compressed_image("/t", PNG_PARAMETERS + png(DEPTH_MM)[:-40], "16UC1; compressedDepth"),
             "is a damaged PNG image",

@@ -90,8 +90,8 @@ def test_variants(data: bytes) -> None:
 @pytest.mark.parametrize(
     ("data", "reason"),
     [
-        (b"plywood", "is no PLY file"),
-        (b"ply\nformat ascii 1.0\nelement vertex 3\n", "is no PLY file"),
+        (b"plywood", "is not a PLY file"),
+        (b"ply\nformat ascii 1.0\nelement vertex 3\n", "is not a PLY file"),
         (_header("ascii", FACES), "no element vertex"),
         (_header("middle_endian", VERTICES), "no line format"),
         (_header("ascii", VERTICES.replace("float z", "float w")), "x, y, w"),

@@ -61,7 +61,7 @@ def test_a_huge_declared_size_is_refused_before_decoding() -> None:
 
 @pytest.mark.parametrize("data", [b"", b"P5 20 20 65535\n", bytes(100)])
 def test_other_bytes_are_no_png(data: bytes) -> None:
-    with pytest.raises(CloudReadError, match="no PNG"):
+    with pytest.raises(CloudReadError, match="not a PNG"):
         parse_depth_png(data)
 
 
@@ -78,7 +78,7 @@ def test_eight_bits_are_read_as_coarse_depth(depth: NDArray[np.uint8], as_colour
     ("image", "message"),
     [
         (Image.new("RGB", (20, 20), (1, 1, 2)), "colour"),
-        (Image.new("LA", (20, 20)), "no grey image"),
+        (Image.new("LA", (20, 20)), "not a grey image"),
         (Image.new("1", (20, 20)), "1 bit"),
         (Image.new("I;16", (20, 20)), "16 bit"),
     ],

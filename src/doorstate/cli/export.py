@@ -8,13 +8,16 @@ from typing import Annotated
 
 import typer
 
-from doorstate.cli.options import Weights
 from doorstate.errors import ConfigError
 
 
 def export(
-    network: Annotated[str, typer.Argument(help="Name of packaged weights, or the network of --weights.")],
-    weights: Weights = None,
+    network: Annotated[
+        str, typer.Argument(help="Name of packaged weights, or the architecture of --weights.")
+    ],
+    weights: Annotated[
+        Path | None, typer.Option(help="Weights file (.safetensors), instead of packaged weights.")
+    ] = None,
     points: Annotated[
         int | None, typer.Option(help="Points that the file takes. [default: as trained]", min=128)
     ] = None,

@@ -26,7 +26,7 @@ def check_shape(points: Points) -> Points:
     if cloud.dtype.kind not in "fiu" or cloud.ndim not in (2, 3) or cloud.shape[-1] != 3:
         has_more_values = cloud.ndim in (2, 3) and 3 < cloud.shape[-1] <= 16
         raise CloudContentError(
-            f"{cloud.dtype} of shape {cloud.shape} is no cloud",
+            f"{cloud.dtype} of shape {cloud.shape} is not a cloud",
             expected="numbers of shape (N, 3) or (H, W, 3)",
             hint="keep x, y and z only" if has_more_values else None,
         )

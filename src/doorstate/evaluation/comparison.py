@@ -77,7 +77,7 @@ class Results:
     predictions: pd.DataFrame
     runs: tuple[RunRecord, ...]
     detections: Mapping[str, Mapping[str, tuple[Detection, ...]]] = field(default_factory=dict)
-    """By rule and sample: detections in samples it did not get right."""
+    """Detections in the samples that a rule did not get right, by rule and sample."""
 
     @cached_property
     def methods(self) -> tuple[str, ...]:

@@ -135,16 +135,16 @@ def _facts(results: Results, dataset: PreparedDataset) -> dict[str, str]:
         "Runs": f"{len(results.runs)} of {len(results.runs) + len(results.missing)}",
         "Data": f"{dataset.description.source} ({dataset.description.kind})",
         "Samples": f"{len(results.manifest)}: "
-        + ", ".join(f"{states.get(state, 0)} {state}" for state in STATES),
-        "Points a cloud": str(config.num_points),
+        + ", ".join(f"{states.get(state, 0)} {STATE_WORDS[state]}" for state in STATES),
+        "Points per cloud": str(config.num_points),
         "Protocol": f"{config.protocol}, {config.folds} folds",
         **{
             name: _range(count[role] for count in roles)
             for name, role in (
-                ("Training samples a fold", "train"),
-                ("Validation samples a fold", "val"),
-                ("Test samples a fold", "test"),
-                ("Unused samples a fold", "unused"),
+                ("Training samples per fold", "train"),
+                ("Validation samples per fold", "val"),
+                ("Test samples per fold", "test"),
+                ("Unused samples per fold", "unused"),
             )
         },
         "Seed": str(config.seed),

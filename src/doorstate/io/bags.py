@@ -75,11 +75,11 @@ def open_bag(path: Path) -> Iterator[Bag]:
         raise CloudReadError("no such file or folder", path=path)
     if path.is_dir() and not (path / "metadata.yaml").is_file():
         raise CloudReadError(
-            "has no metadata.yaml, so it is no ROS 2 bag", path=path, hint="open the file inside"
+            "has no metadata.yaml, so it is not a ROS 2 bag", path=path, hint="open the file inside"
         )
     if path.is_file() and path.suffix not in BAG_SUFFIXES:
         raise CloudReadError(
-            "is no bag", path=path, expected=f"a file {' '.join(BAG_SUFFIXES)}, or a ROS 2 bag folder"
+            "is not a bag", path=path, expected=f"a file {' '.join(BAG_SUFFIXES)}, or a ROS 2 bag folder"
         )
     is_ros1 = path.is_file() and path.suffix == ".bag"
     types = get_typestore(Stores.ROS1_NOETIC if is_ros1 else Stores.LATEST)

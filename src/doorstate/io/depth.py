@@ -63,7 +63,7 @@ def check_roll(roll_deg: int) -> None:
     """
     if roll_deg not in ROLLS_DEG:
         raise CameraError(
-            f"{roll_deg} degrees is no quarter turn", field="roll_deg", expected="0, 90, 180 or 270"
+            f"{roll_deg} degrees is not a quarter turn", field="roll_deg", expected="0, 90, 180 or 270"
         )
 
 

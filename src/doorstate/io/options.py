@@ -49,7 +49,7 @@ class ReadOptions:
             Intrinsics(1, 1, *self.intrinsics)  # checks the four numbers
         elif not isinstance(self.intrinsics, Intrinsics | None):
             raise CameraError(
-                f"{self.intrinsics!r} is no camera", field="intrinsics", expected="Intrinsics or Pinhole"
+                f"{self.intrinsics!r} is not a camera", field="intrinsics", expected="Intrinsics or Pinhole"
             )
 
 

@@ -46,7 +46,7 @@ def parse_pcd(data: bytes) -> NDArray[Any]:
     header_end = _DATA_LINE.search(data)
     if header_end is None:
         raise CloudReadError(
-            "is no PCD file", expected="a header with DATA ascii, binary or binary_compressed"
+            "is not a PCD file", expected="a header with DATA ascii, binary or binary_compressed"
         )
     encoding = Encoding(header_end[1].decode())
     metadata, shape = _read_header(data[: header_end.start()].decode("ascii", errors="replace"), encoding)

@@ -55,7 +55,7 @@ def parse_ply(data: bytes) -> NDArray[Any]:
     """
     header = _HEADER.match(data)
     if header is None:
-        raise CloudReadError("is no PLY file", expected="a header from ply to end_header")
+        raise CloudReadError("is not a PLY file", expected="a header from ply to end_header")
     byte_order, elements = _read_header(header[0].decode("ascii", errors="replace"))
     place = next((place for place, element in enumerate(elements) if element.name == "vertex"), None)
     if place is None:

@@ -56,7 +56,7 @@ def parse_coarse_png(data: bytes) -> NDArray[np.uint8]:
     if bits != 8:
         raise CloudReadError(f"is an image with {bits} bit", expected="8 bit, as in this data set")
     if colour_type not in (0, 2):
-        raise CloudReadError("is no grey image")
+        raise CloudReadError("is not a grey image")
     pixels = _pixels(data).astype(np.uint8)
     if pixels.ndim == 3:
         if (pixels != pixels[..., :1]).any():
@@ -68,10 +68,10 @@ def parse_coarse_png(data: bytes) -> NDArray[np.uint8]:
 def _check(data: bytes) -> tuple[int, int]:
     """Return bits per channel and colour type of a PNG, after checking its declared size."""
     if len(data) < _HEADER.size:
-        raise CloudReadError("is no PNG image")
+        raise CloudReadError("is not a PNG image")
     signature, chunk, width, height, bits, colour_type = _HEADER.unpack_from(data)
     if signature != _SIGNATURE or chunk != b"IHDR":
-        raise CloudReadError("is no PNG image")
+        raise CloudReadError("is not a PNG image")
     if bits * width * height > 8 * _MAX_EXPANSION * len(data):
         raise CloudReadError(
             f"is truncated: {width} x {height} pixels are declared, {len(data)} bytes are there"
