@@ -31,8 +31,8 @@ def atomic_path(target: Path) -> Iterator[Path]:
         yield temporary
         temporary.replace(target)
     except OSError as error:
-        of_another_file = error.filename is not None and str(error.filename) != str(temporary)
-        if of_another_file or isinstance(error, FileNotFoundError):
+        is_other_file = error.filename is not None and str(error.filename) != str(temporary)
+        if is_other_file or isinstance(error, FileNotFoundError):
             raise
         raise OutputError(f"cannot be written ({error.strerror or error})", path=target) from error
     finally:

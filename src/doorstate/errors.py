@@ -44,8 +44,8 @@ class DoorstateError(Exception):
 
     Args:
         message: what is wrong, in words that name no command and no option.
-        path: file or folder it is wrong with.
-        field: parameter, column or key it is wrong with, by its name in Python or in the file.
+        path: file or folder with the problem.
+        field: parameter, column or key with the problem, by its name in Python or in the file.
         expected: what would be accepted instead.
         hint: what to do about it, in words that every surface can use.
         suggestions: parameters by name and the values to try, such as `{"frame": "optical"}`.
@@ -76,7 +76,7 @@ class DoorstateError(Exception):
         """Return one printable line: place, problem, what is expected, what to do.
 
         Args:
-            parameter: how the surface writes parameters.
+            parameter: writes a parameter as the surface spells it.
             with_path: start with the path, where there is one.
         """
         place = [] if self.path is None or not with_path else [str(self.path)]
@@ -95,7 +95,7 @@ class DoorstateError(Exception):
         return line if len(line) <= MAX_MESSAGE_LENGTH else f"{line[: MAX_MESSAGE_LENGTH - 3]}..."
 
     def located(self, path: str | Path) -> Self:
-        """Return the same error, of a file or folder that the code which raised it did not know."""
+        """Return the same error with the path of the file or folder, where the code that raised it had none."""
         return type(self)(self.message, **self._fields() | {"path": path})
 
     def _fields(self) -> dict[str, Any]:
@@ -162,28 +162,28 @@ def missing_extra(feature: str, *packages: str) -> MissingExtraError:
 
 
 def unknown_name(
-    kind: str, name: str, known: Iterable[str], error: type[DoorstateError] = ConfigError
+    kind: str, name: str, names: Iterable[str], error: type[DoorstateError] = ConfigError
 ) -> DoorstateError:
-    """Return the error of a name that does not exist, with the closest known name or all of them.
+    """Return the error of a name that does not exist, with the closest name or all names.
 
     Args:
-        kind: of thing that is named, such as "network".
+        kind: kind of thing, such as "network".
         name: the unknown name.
-        known: all known names.
+        names: all names that exist.
         error: class of the error.
     """
-    known = list(known)
-    close = get_close_matches(name, known, n=1)
-    hint = f"did you mean {close[0]!r}?" if close else f"known are {', '.join(known) or 'none'}"
+    names = list(names)
+    close = get_close_matches(name, names, n=1)
+    hint = f"did you mean {close[0]!r}?" if close else f"names are {', '.join(names) or 'none'}"
     return error(f"unknown {kind} {name!r}", hint=hint)
 
 
 def first_validation_error(error: ValidationError, fields: Iterable[str] = ()) -> str:
-    """Return the place and text of the first problem, and all known fields if one is missing or unknown."""
+    """Return the place and text of the first problem, and all fields if one is missing or unknown."""
     problem = error.errors()[0]
     text = ": ".join(filter(None, [".".join(map(str, problem["loc"])), problem["msg"]]))
-    known = ", ".join(fields) if problem["type"] in ("missing", "extra_forbidden") else ""
-    return f"{text}; fields are {known}" if known else text
+    listed = ", ".join(fields) if problem["type"] in ("missing", "extra_forbidden") else ""
+    return f"{text}; fields are {listed}" if listed else text
 
 
 def summarize_exception(error: Exception) -> str:

@@ -26,7 +26,7 @@ class CloudSpec(FrozenModel):
 
     Attributes:
         num_points: points to keep.
-        thin: of an organized cloud, sample from every second, third, ... row and column only, as long as 16 times
+        thin: sample from every second, third, ... row and column of an organized cloud only, as long as 16 times
             `num_points` pixels remain. Several times faster, and no point moves by more than a few pixels.
         max_depth_m: drop points farther ahead, along x. Farthest-point sampling spreads over space, so that surfaces
             beyond the training data, such as the end of a corridor, would take most of the points.

@@ -14,7 +14,7 @@ def thinned_pixels(shape: tuple[int, ...], num_points: int) -> Indices:
     """Return the rows of a flattened cloud that thinning keeps: those of every k-th row and column of an image.
 
     Args:
-        shape: (N, 3), of which all rows are kept, or (H, W, 3).
+        shape: (H, W, 3), or (N, 3), which is not thinned.
         num_points: points to be sampled; at least 16 times as many pixels remain, if there are that many.
     """
     if len(shape) != 3:

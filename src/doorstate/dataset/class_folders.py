@@ -60,7 +60,7 @@ def file_row(root: Path, path: Path, label: str) -> dict[str, str]:
 
 
 def labelled_rows(root: Path, poses_csv: Path | None = None) -> list[dict[str, str]]:
-    """Return one manifest row for every cloud in a class folder, with pose and strata where the CSV has them.
+    """Return one manifest row for every cloud in a class folder, with pose and strata if the CSV has them.
 
     Every file with a suffix of a cloud format counts; a `notes.txt` is rejected when it is read.
 

@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from doorstate import __version__
-from doorstate._files import atomic_path, is_vacant, write_csv
+from doorstate._files import is_vacant, write_csv
+from doorstate.dataset.pieces import write_concatenated
 from doorstate.dataset.store import (
     CLOUDS_FILE,
     PARTS_FILE,
@@ -50,10 +51,11 @@ def join_datasets(sources: Sequence[Path], folder: Path) -> PreparedDataset:
     if count > 1:
         raise DatasetError(f"{count} samples are named {name!r}", field="sample_id")
     folder.mkdir(parents=True, exist_ok=True)
-    _stack(folder / CLOUDS_FILE, [dataset.clouds for dataset in datasets])
+    clouds = (dataset.clouds for dataset in datasets)
+    write_concatenated(folder / CLOUDS_FILE, clouds, (len(rows), num_points, 3), np.float32)
     if all(dataset.has_parts for dataset in datasets):
-        parts = [dataset.parts_of(np.arange(len(dataset)), num_points) for dataset in datasets]
-        _stack(folder / PARTS_FILE, parts)
+        parts = (dataset.parts_of(np.arange(len(dataset)), num_points) for dataset in datasets)
+        write_concatenated(folder / PARTS_FILE, parts, (len(rows), num_points), np.uint8)
     write_csv(folder / MANIFEST_FILE, rows)
     names = [name for dataset in datasets for name in dataset.description.source.split(_SEPARATOR)]
     limits_m = [dataset.description.max_depth_m for dataset in datasets]
@@ -85,12 +87,3 @@ def _is_unfinished(folder: Path) -> bool:
     """Return True for the files of a join that was killed before it wrote its description."""
     names = {path.name for path in folder.iterdir() if ".tmp." not in path.name} if folder.is_dir() else set()
     return CLOUDS_FILE in names and names <= {CLOUDS_FILE, PARTS_FILE, MANIFEST_FILE}
-
-
-def _stack(target: Path, arrays: Sequence[np.ndarray]) -> None:
-    shape = (sum(len(array) for array in arrays), *arrays[0].shape[1:])
-    with atomic_path(target) as temporary:
-        joined = np.lib.format.open_memmap(temporary, mode="w+", dtype=arrays[0].dtype, shape=shape)
-        np.concatenate(arrays, out=joined)
-        joined.flush()
-        del joined

@@ -37,9 +37,9 @@ def labelled_frames(
     An `index.csv` (`frame_index`) takes precedence over the names of sub-folders.
 
     Args:
-        folder: with an index, or with sub-folders named after states.
-        options: for files that state neither camera nor units, where the index does not either.
-        layout: name in `dataset.layouts`, instead of both.
+        folder: folder with an index, or with sub-folders named after states.
+        options: read options of files whose camera and units neither they nor the index state.
+        layout: name in `dataset.layouts`, in place of index and sub-folders.
 
     Raises:
         CloudReadError: no cloud at all.

@@ -76,7 +76,7 @@ class CloudLoader:
         Args:
             dataset: prepared clouds.
             sample_ids: samples to load, in order.
-            num_points: of each cloud.
+            num_points: points of each cloud.
             find_neighbours: search that runs once per cloud, before augmentation; only for augmentations that do not
                 change its result.
             heads: names of the heads that need targets; with "door" among them, samples without a door are allowed
@@ -119,8 +119,8 @@ class CloudLoader:
 
         Args:
             batch_size: clouds of a batch; at most the clouds of the epoch.
-            augmentation: of the points and targets.
-            seed: of the epoch.
+            augmentation: random changes of points and targets.
+            seed: seed of the epoch.
             skip: number of batches to leave out at the start.
             limit: number of random clouds in the epoch; None is all.
         """

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Clouds of a piece of work in one `.npz` file, and the arrays of all pieces as one."""
+"""Clouds of a piece of work in one `.npz` file, and arrays of many pieces joined to one `.npy` file."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from doorstate.types import Points
 
 
 class PieceClouds:
-    """Prepared clouds of a piece, and for each of its samples the reason for which it is left out, or ""."""
+    """Prepared clouds of a piece, and for each sample the reason why it is left out, or ""."""
 
     def __init__(self, num_points: int) -> None:
         self._num_points = num_points
@@ -45,12 +45,6 @@ class PieceClouds:
             )
 
 
-class _Array(NamedTuple):
-    name: str
-    shape: tuple[int, ...]  # of one sample
-    dtype: type
-
-
 class SavedPieces(NamedTuple):
     """Files of `PieceClouds` in the order of their samples."""
 
@@ -68,21 +62,35 @@ class SavedPieces(NamedTuple):
 
     def join_clouds(self, target: Path, num_points: int) -> None:
         """Write the clouds of all pieces as one array (M, n, 3)."""
-        self._join(target, _Array("clouds", (num_points, 3), np.float32))
+        shape = (self.reasons.count(""), num_points, 3)
+        write_concatenated(target, self._arrays("clouds"), shape, np.float32)
 
     def join_parts(self, target: Path, num_points: int) -> None:
         """Write the parts of all pieces as one array (M, n)."""
-        self._join(target, _Array("parts", (num_points,), np.uint8))
+        write_concatenated(target, self._arrays("parts"), (self.reasons.count(""), num_points), np.uint8)
 
-    def _join(self, target: Path, array: _Array) -> None:
-        shape = (self.reasons.count(""), *array.shape)
-        with atomic_path(target) as temporary:
-            joined = np.lib.format.open_memmap(temporary, mode="w+", dtype=array.dtype, shape=shape)
-            start = 0
-            for path in self.paths:
-                with np.load(path, allow_pickle=False) as piece:
-                    part = piece[array.name]
-                joined[start : start + len(part)] = part
-                start += len(part)
-            joined.flush()
-            del joined
+    def _arrays(self, name: str) -> Iterator[NDArray[Any]]:
+        for path in self.paths:
+            with np.load(path, allow_pickle=False) as piece:
+                yield piece[name]
+
+
+def write_concatenated(
+    target: Path, arrays: Iterable[NDArray[Any]], shape: tuple[int, ...], dtype: type[np.generic]
+) -> None:
+    """Write arrays one after another into one `.npy` file; only one of them needs to be in memory.
+
+    Args:
+        target: file to write.
+        arrays: arrays that differ in the length of the first axis only.
+        shape: shape of all of them together.
+        dtype: number type of the file.
+    """
+    with atomic_path(target) as temporary:
+        joined = np.lib.format.open_memmap(temporary, mode="w+", dtype=dtype, shape=shape)
+        start = 0
+        for array in arrays:
+            joined[start : start + len(array)] = array
+            start += len(array)
+        joined.flush()
+        del joined

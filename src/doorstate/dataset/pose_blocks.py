@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,18 +18,19 @@ from scipy.spatial import cKDTree
 
 from doorstate.errors import DatasetError
 
+if TYPE_CHECKING:
+    from doorstate.dataset.splits import Role
+
 EMBARGO_M = 0.5
-_Role = Literal["train", "val", "test", "unused"]
-_Row = Mapping[str, str]
 
 
-def split_poses(rows: Sequence[_Row], folds: int, seed: int) -> list[dict[str, _Role]]:
+def split_poses(rows: Sequence[Mapping[str, str]], folds: int, seed: int) -> list[dict[str, Role]]:
     """Return one {sample_id: role} per fold.
 
     Args:
-        rows: with `pose_id`, `distance_m` and `robot_angle_deg`.
+        rows: samples with `pose_id`, `distance_m` and `robot_angle_deg`.
         folds: number of folds and of sectors.
-        seed: of the validation poses.
+        seed: seed of the choice of validation poses.
 
     Raises:
         DatasetError: a row lacks its pose.
@@ -38,7 +39,7 @@ def split_poses(rows: Sequence[_Row], folds: int, seed: int) -> list[dict[str, _
     names = sorted(poses)
     positions = np.array([poses[name] for name in names])  # (P, 2) metres
     block = _blocks(positions, folds)
-    splits: list[dict[str, _Role]] = []
+    splits: list[dict[str, Role]] = []
     for fold in range(folds):
         tested = (block == 2 * fold) | (block == 2 * ((fold + 2) % folds) + 1)
         to_tested_m, _ = cKDTree(positions[tested]).query(positions)
@@ -47,7 +48,7 @@ def split_poses(rows: Sequence[_Row], folds: int, seed: int) -> list[dict[str, _
         rng = np.random.default_rng([seed, fold])
         # One in eight of the free poses: 10 to 70 as in the paper.
         validation = set(rng.permutation(free)[: max(1, round(len(free) / 8))].tolist())
-        role: dict[str, _Role] = {}
+        role: dict[str, Role] = {}
         for number, name in enumerate(names):
             if tested[number]:
                 role[name] = "test"
@@ -59,7 +60,7 @@ def split_poses(rows: Sequence[_Row], folds: int, seed: int) -> list[dict[str, _
     return splits
 
 
-def _poses(rows: Sequence[_Row]) -> dict[str, tuple[float, float]]:
+def _poses(rows: Sequence[Mapping[str, str]]) -> dict[str, tuple[float, float]]:
     """Return x and y in metres by `pose_id`."""
     poses: dict[str, tuple[float, float]] = {}
     for row in rows:

@@ -60,8 +60,8 @@ def simulate_prepared(
     If the simulation exists already, or was started without this step, its frames are rendered again.
 
     Args:
-        settings: of the simulation.
-        preparation: of the clouds.
+        settings: settings of the simulation.
+        preparation: preparation of the clouds.
         folder: output folder of the prepared data set.
         workers: processes; None is one per processor.
         progress: called with pieces of the simulation done and pieces in all.

@@ -25,7 +25,6 @@ from doorstate.dataset.pose_blocks import split_poses
 from doorstate.errors import ConfigError, DatasetError
 
 Role = Literal["train", "val", "test", "unused"]
-Row = Mapping[str, str]
 Strata = Sequence[tuple[str, ...]]
 EVERYTHING, UNSEEN = "all", "unseen"
 ONE_FOLD: Mapping[str, Role] = {EVERYTHING: "train", UNSEEN: "test"}
@@ -36,7 +35,7 @@ _TENTHS = 10
 _LEAST_SAMPLES = 3 * _TENTHS
 
 
-def draw_splits(rows: Sequence[Row], protocol: str, seed: int) -> list[dict[str, Role]]:
+def draw_splits(rows: Sequence[Mapping[str, str]], protocol: str, seed: int) -> list[dict[str, Role]]:
     """Draw the role of every sample in every fold.
 
     Returns:
@@ -56,7 +55,10 @@ def draw_splits(rows: Sequence[Row], protocol: str, seed: int) -> list[dict[str,
         )
     if protocol in ONE_FOLD:
         return [dict.fromkeys((row["sample_id"] for row in rows), ONE_FOLD[protocol])]
-    splits = {"paper": _by_stratum, "by-pose": _by_pose, "by-scene": _by_scene}[protocol](rows, seed)
+    if protocol == "by-pose":
+        splits = split_poses(rows, NUM_FOLDS, seed)
+    else:
+        splits = (_by_scene if protocol == "by-scene" else _by_stratum)(rows, seed)
     for fold, roles in enumerate(splits):
         for role in ("train", "val", "test"):
             if role not in roles.values():
@@ -66,17 +68,17 @@ def draw_splits(rows: Sequence[Row], protocol: str, seed: int) -> list[dict[str,
     return splits
 
 
-def origin(row: Row) -> str:
-    """Return what a trained and a tested sample must not share: the scene, or seed and name without one."""
+def origin(row: Mapping[str, str]) -> str:
+    """Return the origin that trained and tested samples must not share: the scene, else seed and name."""
     return row.get("scene_id") or f"{row.get('seed', '')}/{row['sample_id']}"
 
 
-def _by_stratum(rows: Sequence[Row], seed: int) -> list[dict[str, Role]]:
+def _by_stratum(rows: Sequence[Mapping[str, str]], seed: int) -> list[dict[str, Role]]:
     strata = [(row["state"], row.get("distance_band", ""), row.get("region", "")) for row in rows]
     return _roles(rows, _tenths(strata, seed))
 
 
-def _by_scene(rows: Sequence[Row], seed: int) -> list[dict[str, Role]]:
+def _by_scene(rows: Sequence[Mapping[str, str]], seed: int) -> list[dict[str, Role]]:
     scenes: dict[str, tuple[str, ...]] = {}
     for row in rows:
         if not row.get("scene_id"):
@@ -92,11 +94,9 @@ def _by_scene(rows: Sequence[Row], seed: int) -> list[dict[str, Role]]:
     return _roles(rows, [tenth[row["scene_id"]] for row in rows])
 
 
-def _by_pose(rows: Sequence[Row], seed: int) -> list[dict[str, Role]]:
-    return split_poses(rows, NUM_FOLDS, seed)
-
-
-def _roles(rows: Sequence[Row], tenths: Sequence[int] | NDArray[np.int64]) -> list[dict[str, Role]]:
+def _roles(
+    rows: Sequence[Mapping[str, str]], tenths: Sequence[int] | NDArray[np.int64]
+) -> list[dict[str, Role]]:
     """Return roles in every fold: two tenths of the samples are tested, one validates."""
     roles: list[dict[str, Role]] = []
     for fold in range(NUM_FOLDS):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reason for a prediction without a state, as data; its sentence is built here and nowhere else."""
+"""Reason for a prediction without a state, as data and as a sentence."""
 
 from __future__ import annotations
 

@@ -19,11 +19,11 @@ P = TypeVar("P", bound=Predictor)
 
 
 def largest_within_budget(with_points: Callable[[int], P], max_points: int, budget_ms: float) -> P:
-    """Return the predictor with most points that takes no more time; that with fewest if all take more.
+    """Return the predictor with the most points within the budget, or with the fewest if none is within it.
 
     Args:
         with_points: makes the predictor that evaluates a number of points.
-        max_points: most points to choose from.
+        max_points: largest number of points to try.
         budget_ms: milliseconds from a raw 640 x 480 cloud to a prediction.
     """
     first, *larger = [count for count in BUDGET_POINTS if count <= max_points] or [max_points]

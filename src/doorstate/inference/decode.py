@@ -16,10 +16,10 @@ def decode(outputs: CloudOutputs, abstain_below: float, num_points: int, millise
     """Return the likeliest state with the geometry, or none where the network sees no door or is unsure.
 
     Args:
-        outputs: of the network.
+        outputs: outputs of the network.
         abstain_below: least probability of a state.
         num_points: points that the network evaluated.
-        milliseconds: that it took.
+        milliseconds: time from the raw cloud to the outputs.
     """
     heads = outputs.heads
     abstention = _abstention(outputs, abstain_below)

@@ -25,7 +25,7 @@ class DoorReport:
     prediction: Prediction  # of this message alone
     filtered: FilteredState  # of all messages so far
     held_s: float | None  # for which filter and messages have agreed; None: this message differs
-    is_open: bool  # and has been for long enough
+    is_open: bool  # open now, and for long enough
     centre_m: NDArray[np.float64]  # (3,) median of the measured points, in the frame of the message
     detections: tuple[Detection, ...] = ()  # of a rule, in the frame of the message
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Gate before every method: a cloud in which too much is missing has no state, because a hole is no free way."""
+"""Gate before every network and rule: too much missing in a cloud means no state, because a hole is no free way."""
 
 from __future__ import annotations
 
@@ -36,15 +36,16 @@ class Gate:
     Args:
         min_points: least number of measured points; the largest neighbourhood of a network.
         min_measured_share: least share of all pixels or rows; chosen: half of the emptiest simulated frame's.
-        max_behind_share: of the measured points; chosen: a camera sees none, a scan or a cloud in another frame half.
+        max_behind_share: largest share of the measured points behind the camera; chosen: a camera sees none, a scan
+            or a cloud in another frame half.
         min_median_range_m: half of the points must be farther; chosen: nearer than any simulated frame's median,
             and an arm's length.
         max_median_range_m: half of the points must be nearer; chosen: 1.5 times the largest of simulated and
             recorded frames with a door.
-        min_extent_m: of the middle nine tenths of the points, in height and across; chosen: half a door's width,
-            which a floor or a hand alone does not have.
-        min_view_deg: across, between the outermost rays; chosen: half an image with a lens of 60 degrees shows 30,
-            an upright one of such a lens 47.
+        min_extent_m: least extent of the middle nine tenths of the points, in height and across; chosen: half a door's
+            width, which a floor or a hand alone does not have.
+        min_view_deg: least angle across, between the outermost rays; chosen: half an image with a lens of 60 degrees
+            shows 30, an upright one of such a lens 47.
         hole_height_share: least height of a hole, as a share of the image's; chosen: 0.5 m of a door 2 to 3 m away,
             more than a handle's glare or a shadow of stereo.
         free_reach_m: horizontal range that must be measured below a hole; chosen: 0.5 m behind the farthest doors
@@ -86,8 +87,8 @@ class Gate:
         """Return the reason why a cloud cannot be used, or None if it can.
 
         Args:
-            cloud: (N, 3) or organized (H, W, 3) metres, x forward, y left, z up; not measured as in
-                clouds.preparation. Holes are looked for in organized clouds and in flat ones of 4800 points or more.
+            cloud: (N, 3) or organized (H, W, 3) metres, x forward, y left, z up, NaN where nothing
+                was measured. Holes are searched in organized clouds, and in flat ones of 4800 points or more.
         """
         view = _View.from_cloud(np.asarray(cloud))
         checks = (

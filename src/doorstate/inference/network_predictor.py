@@ -76,7 +76,7 @@ class NetworkPredictor(Predictor):
         threads: int | None = None,
         clock: Callable[[], float] = time.perf_counter,
     ) -> NetworkPredictor:
-        """Load packaged weights by name or a weights file by path; arguments as of `Predictor.load` and the class.
+        """Load packaged weights by name or a weights file by path; arguments as in `Predictor.load` and the class.
 
         Raises:
             ConfigError: both points and a budget, or a budget that is not above zero.
@@ -115,10 +115,10 @@ class NetworkPredictor(Predictor):
             One prediction a cloud, in their order; `milliseconds` is an equal share of the time of all.
 
         Raises:
-            CloudContentError: a cloud that is none or not in metres, or one cloud in place of several.
+            CloudContentError: an array that is no cloud or not in metres, or one cloud in place of several.
         """
         started = self.clock()
-        cleaned = [check_single_cloud(cloud) for cloud in _several(clouds)]
+        cleaned = [check_single_cloud(cloud) for cloud in _check_batch(clouds)]
         samples = [self._gate(cloud, self._sample(cloud)) for cloud in cleaned]
         accepted = [sample.points for sample in samples if sample.abstention is None]
         outputs = iter(run_by_size(self.backend, accepted))
@@ -171,7 +171,7 @@ class _Sample(NamedTuple):
     abstention: Abstention | None = None
 
 
-def _several(clouds: Sequence[Points]) -> Sequence[Points]:
+def _check_batch(clouds: Sequence[Points]) -> Sequence[Points]:
     whole = np.asarray(clouds) if hasattr(clouds, "ndim") else None
     if whole is not None and (whole.ndim == 2 or (whole.ndim == 3 and is_image(whole))):
         raise CloudContentError(f"this is one cloud, {whole.shape}: give several, or call the predictor")

@@ -18,7 +18,7 @@ def prediction_to_dict(
     """Return a prediction as JSON values; fields without a value are left out.
 
     Args:
-        prediction: of any method.
+        prediction: prediction of a network or a rule.
         parameter: writes a parameter that a reason suggests as the surface spells it.
     """
     record: dict[str, Any] = {

@@ -33,11 +33,11 @@ class StateFilter:
     frame without a state adds nothing. Stamps may be irregular; one before the last resets the filter.
 
     Args:
-        stay_probability: that a door is in the same state a second later; chosen: forgets all in about 3 s without
-            frames, as a person opens or closes a door in 1 to 2 s.
+        stay_probability: probability that a door is in the same state a second later; chosen: forgets all in about 3 s
+            without frames, as a person opens or closes a door in 1 to 2 s.
         full_weight_s: time between frames of weight one; chosen: frames of a standing robot have similar errors.
-        max_weight: of one frame, however long ago the last is; chosen: with `min_likelihood`, no single frame can
-            bring a new filter to `enter_probability`.
+        max_weight: largest weight of one frame, however long ago the last is; chosen: with `min_likelihood`, no single
+            frame can bring a new filter to `enter_probability`.
         min_likelihood: least factor of a frame for a state; chosen: above the networks' error rate on simulated doors,
             and rules give zeros.
         enter_probability: a state begins when its probability reaches this.
@@ -84,7 +84,7 @@ class StateFilter:
         """Add one frame.
 
         Args:
-            prediction: of a network or a rule; without a state it is no evidence.
+            prediction: prediction for the frame; without a state it is no evidence.
             stamp_s: time of the frame, on any clock.
 
         Raises:

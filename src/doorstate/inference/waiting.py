@@ -62,13 +62,13 @@ def wait_for(
         stream: (stamp in seconds, cloud or prediction), in order; it is read no further than needed.
         timeout_s: longest time from the first stamp on.
         hold_s: time for which the filtered state must have held.
-        predictor: of clouds; None loads the packaged weights.
+        predictor: method for clouds; None loads the packaged weights.
         state_filter: filter to use, with other parameters or earlier frames; None makes a new one.
         max_gap_s: longest gap between frames with a state (`HoldTimer`).
 
     Raises:
         ConfigError: no such state, negative seconds, or a stamp that is not finite.
-        CloudContentError: of the predictor.
+        CloudContentError: as in `Predictor.__call__`.
     """
     target = _parse_state(state)
     for field, seconds in (("timeout_s", timeout_s), ("hold_s", hold_s)):
@@ -85,7 +85,7 @@ def wait_for(
             predictor = predictor or Predictor.load()
             prediction = predictor(frame)
         filtered = state_filter.update(prediction, stamp_s)
-        # Stamps that go back, as of a recording in a loop, add no time.
+        # Stamps that go back, such as those of a recording in a loop, add no time.
         waited_s += max(0.0, stamp_s - last_s) if last_s is not None else 0.0
         last_s = stamp_s
         if waited_s > timeout_s:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Watch over a door: the messages of one camera in, a report after each out. Needs no ROS."""
+"""Watch over a door: a report after every message of one camera. Needs no ROS."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class DoorWatch:
         predictor: network or rule; None loads the one that the settings name.
 
     Raises:
-        DoorstateError: as of `WatchSettings.load_predictor`.
+        DoorstateError: as in `WatchSettings.load_predictor`.
     """
 
     def __init__(self, settings: WatchSettings, predictor: Predictor | None = None) -> None:
@@ -85,7 +85,7 @@ class DoorWatch:
         """Return the report after a message; one that cannot be read is unknown, with the reason.
 
         Args:
-            message: with the fields of its type.
+            message: message of the topic, with the fields of its type.
             received_ns: stamp to use if the message has none.
         """
         stamp_ns = stamp_ns_of(message) or received_ns

@@ -60,7 +60,7 @@ class WatchSettings(FrozenModel):
         """Load and warm up the network or rule that is named.
 
         Raises:
-            DoorstateError: as of `Predictor.load`.
+            DoorstateError: as in `Predictor.load`.
         """
         predictor = Predictor.load(
             None if self.rule and not self.weights else self.weights or self.network,

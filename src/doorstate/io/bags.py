@@ -162,7 +162,7 @@ class Bag:
             yield self._stamped(log_ns, raw, topic.type, convert)
 
     def _problem(self, name: str) -> str:
-        """Return why a topic cannot be read, or an empty string; the encoding of images is that of the first."""
+        """Return the reason why a topic cannot be read, or ""; images are checked by the encoding of the first."""
         topic = self._topics.get(name)
         if topic is None:
             return f"no topic {name}"

@@ -63,10 +63,10 @@ def _fit_to_image(camera: Pinhole, width: int, height: int) -> Intrinsics:
 
 
 def _metres_per_unit(is_float: bool, options: ReadOptions) -> float:
-    """Return the scale for this kind of depth image.
+    """Return the metres per unit of integer or floating point depth images.
 
     Raises:
-        CameraError: only the scale of the other kind was given.
+        CameraError: only the scale of the other kind is set.
     """
     if is_float:
         return options.units_m

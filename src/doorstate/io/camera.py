@@ -108,7 +108,7 @@ def read_intrinsics(path: Path) -> Intrinsics:
     """
     try:
         text = _beginning(path).decode("utf-8-sig")
-        # A recorded topic (`rostopic echo`) is a stream of documents, of which the first may be empty.
+        # A recorded topic (`rostopic echo`) is a stream of documents, and the first may be empty.
         documents = [json.loads(text)] if path.suffix.lower() == ".json" else plain_documents(text)
         return _from_mapping(next((document for document in documents if document is not None), None))
     except CameraError as error:

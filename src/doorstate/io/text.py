@@ -57,7 +57,7 @@ def parse_rows(body: bytes, columns: Sequence[int], count: int, skip: int = 0) -
         body: text after the header.
         columns: places of x, y, z in a row.
         count: rows the header declares.
-        skip: rows before the first of them.
+        skip: rows to leave out before them.
 
     Returns:
         (count, 3) in file order and units.

@@ -87,7 +87,7 @@ class PointNetwork(nn.Module, ABC):
 
         Args:
             points: (B, N, 3) centred coordinates in farthest-point order, N >= `min_points`.
-            neighbourhoods: of these points; None searches them.
+            neighbourhoods: result of `neighbourhoods` for these points; None searches them.
 
         Returns:
             (B, num_classes) logits, float32 also under autocast.

@@ -13,6 +13,8 @@ from doorstate.clouds.normalization import SCALE_M
 from doorstate.clouds.preparation import CloudSpec
 from doorstate.types import STATES
 
+CARD_KEY = "doorstate"  # of the card, in the metadata of weights files and exported networks
+
 
 class WeightsCard(FrozenModel):
     """Network, preparation of clouds, calibration and origin of a weights file."""

@@ -41,7 +41,7 @@ def add_heads(network: PointNetwork, names: Sequence[str]) -> None:
 
     Args:
         network: any network.
-        names: of `HEADS` or `POINT_HEADS`.
+        names: names in `HEADS` or `POINT_HEADS`.
 
     Raises:
         ConfigError: unknown head, or a head for points on a network without a per-point branch.
@@ -67,7 +67,7 @@ def head_outputs(
     Args:
         network: any network.
         points: (B, N, 3) as in `PointNetwork.forward`.
-        neighbourhoods: as there.
+        neighbourhoods: as in `PointNetwork.forward`.
         with_points: run the heads that classify points, too.
 
     Returns:
@@ -75,7 +75,7 @@ def head_outputs(
         of the heads that classify points.
 
     Raises:
-        CloudContentError: as there.
+        CloudContentError: as in `PointNetwork.forward`.
     """
     network.check_points(points)
     encoding = network.encode(points, neighbourhoods)
@@ -103,8 +103,8 @@ def joint_losses(
         network: any network.
         points: (B, N, 3) as in `PointNetwork.forward`.
         labels: (B,) int64 states, -100 without a door.
-        targets: by head.
-        label_smoothing: of the state.
+        targets: targets by head.
+        label_smoothing: as in `PointNetwork.training_loss`, for the state.
         neighbourhoods: as in `PointNetwork.forward`.
         part_points: number of points per cloud, the first ones, on which heads for points are trained; None takes all.
 

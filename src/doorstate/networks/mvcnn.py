@@ -80,7 +80,7 @@ class MVCNN(PointNetwork):
 
 
 def _view_rotations() -> Tensor:
-    """(V, 3, 3) rotations from the cloud's axes to each camera's: depth along its view, left, up."""
+    """Return the (V, 3, 3) rotations from the cloud's axes to each camera's: depth along its view, left, up."""
     rotations = []
     for azimuth_deg, elevation_deg in VIEWS_DEG:
         a, e = math.radians(azimuth_deg), math.radians(elevation_deg)

@@ -117,7 +117,7 @@ class Point2Sequence(PointNetwork):
         self.num_centres = max(1, round(share * NUM_CENTRES))
 
     def neighbourhoods(self, points: Tensor) -> Neighbourhoods:
-        """Return one (B, M, 128): sorted neighbours of the centres, of which the areas are the first 16 to 128."""
+        """Return one (B, M, 128): sorted neighbours of the centres; the areas are the first 16, 32, 64 and all 128."""
         largest = max(AREAS)
         # Deviation: with fewer than 128 * dilation points the dilation shrinks.
         dilation = min(self.dilation, points.shape[1] // largest)

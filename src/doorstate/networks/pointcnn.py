@@ -180,7 +180,7 @@ class PointCNN(PointNetwork):
         return rows
 
     def encode(self, points: Tensor, neighbourhoods: Neighbourhoods | None = None) -> Encoding:
-        """Encode (B, N, 3) points; intermediate: `point_features`, of which the features are the mean."""
+        """Encode (B, N, 3) points; the features are the mean of `point_features`, which are the intermediate tensor."""
         rows = self.point_features(points, neighbourhoods)  # (B, P, 192)
         features = at_least_float32(rows).mean(dim=1)  # (B, 192)
         return Encoding(features, (rows,))
@@ -188,7 +188,7 @@ class PointCNN(PointNetwork):
     def loss_from_encoding(
         self, encoding: Encoding, labels: Tensor, label_smoothing: float
     ) -> tuple[Tensor, Tensor]:
-        """Mean cross entropy of all representative points; the logits returned are their mean."""
+        """Return the mean cross entropy of all representative points, and the mean of their logits."""
         (rows,) = encoding.intermediate
         logits = at_least_float32(self.head(rows))  # (B, P, C)
         tiled = labels.unsqueeze(1).expand(logits.shape[:2])  # (B, P)

@@ -45,7 +45,7 @@ class PointNet(PointNetwork):
 
     Args:
         num_classes: number of logits.
-        regularizer_weight: of the feature transform's distance from an orthogonal matrix.
+        regularizer_weight: weight of the feature transform's distance from an orthogonal matrix in the loss.
         batchnorm_eps: epsilon of every batch normalisation; 1e-3 in the original.
     """
 
@@ -78,7 +78,7 @@ class PointNet(PointNetwork):
     def loss_from_encoding(
         self, encoding: Encoding, labels: Tensor, label_smoothing: float
     ) -> tuple[Tensor, Tensor]:
-        """Cross entropy + weight/2 * sum over the batch of |A A^T - I|_F^2, A the feature transform.
+        """Return cross entropy + weight/2 * sum over the batch of |A A^T - I|_F^2, A the feature transform.
 
         A sum, not a mean, as TensorFlow's l2_loss in the original: its weight grows with the batch.
         """

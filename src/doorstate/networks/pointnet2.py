@@ -55,7 +55,7 @@ class SetAbstraction(nn.Module):
 
     Args:
         num_centres: the first points of the cloud serve as centres, all points if there are fewer.
-        radius: of a scale with relative radius 1.
+        radius: ball radius of a scale with relative radius 1.
         scales: sizes and widths; the features of the scales are concatenated.
         num_features: channels of the points' features.
     """

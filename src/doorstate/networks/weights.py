@@ -15,11 +15,9 @@ from doorstate.clouds.normalization import SCALE_M
 from doorstate.errors import WeightsError
 from doorstate.networks import create_network
 from doorstate.networks.base import PointNetwork
-from doorstate.networks.card import WeightsCard
+from doorstate.networks.card import CARD_KEY, WeightsCard
 from doorstate.networks.head_layers import add_heads
 from doorstate.types import STATES
-
-_CARD_KEY = "doorstate"
 
 
 def save_weights(path: Path, network: PointNetwork, card: WeightsCard, half: bool = False) -> None:
@@ -29,7 +27,7 @@ def save_weights(path: Path, network: PointNetwork, card: WeightsCard, half: boo
         for name, tensor in network.state_dict().items()
     }
     with atomic_path(path) as temporary:
-        save_file(tensors, temporary, metadata={_CARD_KEY: card.model_dump_json()})
+        save_file(tensors, temporary, metadata={CARD_KEY: card.model_dump_json()})
 
 
 def read_card(path: Path) -> WeightsCard:
@@ -43,7 +41,7 @@ def read_card(path: Path) -> WeightsCard:
     try:
         with safe_open(path, framework="pt") as weights:
             metadata = weights.metadata() or {}
-        return WeightsCard.model_validate_json(metadata[_CARD_KEY])
+        return WeightsCard.model_validate_json(metadata[CARD_KEY])
     except (OSError, SafetensorError) as error:
         raise WeightsError(f"cannot be read as safetensors ({error})", path=path) from error
     except (KeyError, ValidationError) as error:

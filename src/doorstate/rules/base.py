@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Interface of a rule: a cloud in; a state, or a reason for none, and the detections that led to it out."""
+"""Interface of a rule, its result and its detections."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ class RuleResult:
     """State of a door, or the reason why there is none, and further estimates of the rule."""
 
     state: DoorState | None
-    reason: str = ""  # for no state; empty with one
+    reason: str = ""  # why there is no state; empty with a state
     opening_angle_deg: float | None = None  # between leaf and wall: 0 is closed
     opening_width_m: float | None = None
-    open_or_not: bool | None = None  # of rules that only separate open doors from all others
+    open_or_not: bool | None = None  # set by rules that separate open doors from all others
     detections: tuple[Detection, ...] = ()
 
     @classmethod
@@ -51,7 +51,7 @@ class Rule(ABC, Generic[P]):
     """Deterministic method: the same cloud gives the same result.
 
     Args:
-        parameters: of the rule; None takes its defaults.
+        parameters: parameters of the rule; None takes its defaults.
     """
 
     name: ClassVar[str]

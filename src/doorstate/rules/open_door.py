@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Open doors from the edges of unmeasured readings: a reconstruction of Kaleci & Turgut 2020, not the authors' code.
 
-Published of their rule: the cloud is gravity-aligned and organized; the corners of an open door are sought among the
+The publication says: the cloud is gravity-aligned and organized; the corners of an open door are sought among the
 neighbours of unmeasured readings; corners give boundary edges; the edges' dimensions are checked. The details of each
 step and every number are chosen here. So is the check of the surfaces beside the edges: a void between the free edge
 of a half-open leaf and a jamb is as wide as a door, too.
@@ -67,7 +67,7 @@ class _Scan:
     row: Indices  # (M,)
     segment: Indices  # (M,) number of the part of its row, without a jump, that a point belongs to
     breaks: Indices  # points after which another segment of the same row follows
-    unmeasured: Flags  # of breaks: nothing was measured between the two
+    unmeasured: Flags  # by break: nothing was measured between its two points
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +75,7 @@ class _Side:
     """Upright surface beside an edge."""
 
     line: Line
-    has_extent: bool  # False: only the edge itself, as of a leaf seen edge-on
+    has_extent: bool  # False: only the edge itself, such as a leaf seen edge-on
 
 
 class OpenDoorRule(Rule[OpenDoorParameters]):

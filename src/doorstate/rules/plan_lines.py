@@ -69,7 +69,7 @@ def strongest_line(
         points: (N, 2) metres.
         threshold_m: largest distance of a point of the line.
         weights: (N,) weights of the points; all equal if None.
-        seed: of the random pairs.
+        seed: seed of the random pairs.
 
     Returns:
         None for fewer than two distinct points.

@@ -32,7 +32,7 @@ def upright_plane(points: Floats, threshold_m: float, *, seed: int = 0) -> tuple
     Args:
         points: (N, 3) metres.
         threshold_m: largest distance of a point of the plane.
-        seed: of the random pairs of points that propose planes.
+        seed: seed of the random pairs of points that propose planes.
 
     Returns:
         None for points without any such plane.

@@ -72,7 +72,7 @@ class WallColumns:
         Args:
             hinge: (2,) place of the hinge.
             tip: (2,) free end of the leaf.
-            void_share: of an opening that must be looked through; 0 is returned if both sides are wall.
+            void_share: share of an opening that must be looked through; 0 is returned if both sides are wall.
         """
         from_hinge_m = self.positions_m - float(self.line.along_m(hinge))
         near_m, far_m = _BESIDE_HINGE_M
@@ -101,8 +101,8 @@ def wall_columns(
     """Return the columns of the wall along a line.
 
     Args:
-        line: of the wall in plan view.
-        plan: of the cloud.
+        line: line of the wall in plan view.
+        plan: floor plan of the cloud.
         points: (N, 3) metres, the cloud.
         column_m: width of a column.
         in_front_m: cells up to this far before the line belong to the wall.

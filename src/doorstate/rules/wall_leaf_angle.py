@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """State from the angle between wall and leaf: a reconstruction of two publications, not the authors' code.
 
-Published of Ning et al. 2023: planes by random samples, the wall, straight lines fitted to the projected points, and
-the state from the angle between the lines of wall and door. Published of Quintana et al. 2018: cells of the wall plane,
-and a door-sized region of empty ones is an open door. The details of each step and every number are chosen here.
+Ning et al. 2023 describe planes by random samples, the wall, straight lines fitted to the projected points, and the
+state from the angle between the lines of wall and door. Quintana et al. 2018 describe cells of the wall plane, and a
+door-sized region of empty cells as an open door. The details of each step and every number are chosen here.
 
 A closed leaf lies in the wall or a little behind it and is no plane of its own. So a wall that is visible without a gap
 over more than a door and its jambs counts as closed: the rule is for a door in view and does not check that there is

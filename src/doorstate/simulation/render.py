@@ -59,9 +59,9 @@ def incidence(
 
     Args:
         rendered: result of `render` or `render_behind_glass` for the same boxes, before or after `cut_range`.
-        boxes: the scene, in the door frame.
-        pose: of the camera, in the door frame.
-        intrinsics: of the camera.
+        boxes: scene in the door frame.
+        pose: camera in the door frame.
+        intrinsics: pinhole model of the camera.
 
     Returns:
         (H, W) float32 radians in [0, pi / 2]; 0 where nothing is hit.

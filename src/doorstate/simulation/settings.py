@@ -57,7 +57,7 @@ def settings_for(
 
     Args:
         preset: name in `PRESETS`.
-        seed: of all random numbers.
+        seed: seed of all random numbers.
         poses: number of poses, for presets of one scene.
         scenes: number of scenes, for presets of many scenes.
         raw: raw files to write.

@@ -30,10 +30,10 @@ def opening_depth_m(pose: CameraPose, intrinsics: Intrinsics, width_m: float, he
     """Return the z-depth at which rays cross an opening, a rectangle on the robot's wall face.
 
     Args:
-        pose: of the camera in the door frame.
-        intrinsics: of the camera.
-        width_m: of the opening.
-        height_m: of the opening.
+        pose: camera in the door frame.
+        intrinsics: pinhole model of the camera.
+        width_m: width of the opening.
+        height_m: height of the opening.
 
     Returns:
         (H, W) float32 metres, NaN for rays that miss the opening.

@@ -53,7 +53,7 @@ def simulate_dataset(
 
     Args:
         folder: output folder.
-        settings: of the data set.
+        settings: preset, seed and extent of the data set.
         workers: processes; None is one per processor.
         progress: called with pieces done and pieces in all.
         callback: called for every piece before it counts as done.

@@ -15,7 +15,7 @@ def load_backend(name_or_path: str | Path, threads: int | None = None) -> Backen
     """Load packaged weights by name, or a `.safetensors` or `.onnx` file by path.
 
     Args:
-        name_or_path: of the weights.
+        name_or_path: name of packaged weights, or path of a file.
         threads: processor threads of one call to an `.onnx` file.
 
     Raises:

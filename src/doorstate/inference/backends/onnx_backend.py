@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from doorstate.clouds.normalization import centroids
 from doorstate.errors import WeightsError, missing_extra, summarize_exception
 from doorstate.inference.backends.base import Outputs
-from doorstate.networks.card import WeightsCard
+from doorstate.networks.card import CARD_KEY, WeightsCard
 from doorstate.networks.heads import head_columns
 from doorstate.types import PARTS, STATES, Points
 
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 INPUT, OUTPUT = "points", "probabilities"
-CARD_KEY = "doorstate"  # in the metadata of the file
 _LOG_ERRORS_ONLY = 3
 
 

@@ -19,7 +19,7 @@ class TorchBackend:
 
     Args:
         network: classifier; is changed to evaluation mode.
-        card: of its weights.
+        card: card of its weights.
     """
 
     num_points = None

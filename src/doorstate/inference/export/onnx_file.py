@@ -16,13 +16,11 @@ from doorstate._files import atomic_path
 from doorstate._jobs import Progress, no_progress
 from doorstate.clouds.normalization import SCALE_M
 from doorstate.errors import ExportError, missing_extra, summarize_exception
-from doorstate.inference.backends.onnx_backend import CARD_KEY
 from doorstate.inference.export.graph import build_graph
 from doorstate.inference.export.parity import Parity, compare_with_torch
-from doorstate.inference.export.quantization import quantize_linear_layers
 from doorstate.inference.reference_clouds import LabelledClouds
 from doorstate.networks.base import PointNetwork
-from doorstate.networks.card import WeightsCard
+from doorstate.networks.card import CARD_KEY, WeightsCard
 from doorstate.networks.heads import HEADS
 from doorstate.types import STATES
 
@@ -71,11 +69,11 @@ def export_onnx(
     Args:
         path: file to write; it appears only if the comparison passes.
         network: classifier.
-        card: of its weights.
+        card: card of its weights.
         clouds: clouds for the comparison; the file takes as many points as they have.
         opset: version of ONNX's operators.
         int8: store the matrices of linear layers as 8-bit integers; then any difference is accepted.
-        progress: of the comparison.
+        progress: called with clouds compared and clouds in all.
 
     Raises:
         MissingExtraError: onnx, onnxscript or onnxruntime is not installed.
@@ -90,7 +88,7 @@ def export_onnx(
             with _without_warnings():
                 model = build_graph(network, card, num_points, opset)
                 if int8:
-                    model = quantize_linear_layers(model, temporary)
+                    model = _quantize_linear_layers(model, temporary)
                 _describe(model, card, num_points)
                 onnx.checker.check_model(model, full_check=True)
         except Exception as error:  # the exporter and the quantizer raise errors of any type
@@ -106,6 +104,21 @@ def export_onnx(
                 path=path,
             )
     return parity
+
+
+def _quantize_linear_layers(model: ModelProto, path: Path) -> ModelProto:
+    """Return the graph with the matrices of linear layers as 8-bit integers.
+
+    Args:
+        model: float32 graph.
+        path: file to work in, because the quantizer reads and writes files.
+    """
+    import onnx
+    from onnxruntime.quantization import QuantType, quantize_dynamic
+
+    onnx.save(model, path)
+    quantize_dynamic(path, path, weight_type=QuantType.QInt8)
+    return onnx.load(path)
 
 
 def _describe(model: ModelProto, card: WeightsCard, num_points: int) -> None:

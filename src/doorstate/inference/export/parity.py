@@ -52,7 +52,7 @@ def compare_with_torch(
     Args:
         path: file written by `export_onnx`.
         network: network it was made of.
-        card: of the network's weights.
+        card: card of the network's weights.
         clouds: clouds with as many points as the file takes.
         progress: called after every three clouds.
     """
@@ -76,11 +76,11 @@ def compare_with_torch(
 
 
 def rounding_effect(network: PointNetwork, card: WeightsCard, points: Points) -> float:
-    """Return the largest change of an output in torch by rounding.
+    """Return the largest effect of rounding on an output of torch.
 
     Args:
         network: network.
-        card: of its weights.
+        card: card of its weights.
         points: (M, n, 3) clouds; the last digits of their points are changed, and all is computed in float64.
     """
     original, rng = TorchBackend(network, card), np.random.default_rng(0)

@@ -87,7 +87,7 @@ def head_metrics(columns: Mapping[str, Floats], rows: Sequence[ManifestRow]) -> 
     """Return all metrics of all heads by name; NaN for heads without columns, or if no sample counts.
 
     Args:
-        columns: (M,) numbers by column name, as of `head_columns`.
+        columns: (M,) numbers by column name, as `head_columns` returns them.
         rows: M lines of the manifest.
     """
     states = np.array([row["state"] for row in rows])

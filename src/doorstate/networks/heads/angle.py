@@ -24,7 +24,7 @@ def _to_values(columns: Floats, centroids: Points) -> Floats:
 
 
 def _to_columns(values: Floats, centroids: Points) -> Floats:
-    """Degrees, moved to the nearest angle that a door can have, 0 to 180: a direction can be any."""
+    """Convert to degrees and to the nearest angle that a door can have, 0 to 180: a direction can be any."""
     angle_deg = np.degrees(values)
     return np.where(angle_deg < 0, np.where(angle_deg < -90, 180.0, 0.0), angle_deg)
 

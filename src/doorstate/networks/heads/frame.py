@@ -31,13 +31,13 @@ def _decode(outputs: Tensor) -> Tensor:
 
 
 def _loss(outputs: Tensor, target: Tensor) -> Tensor:
-    """Error of the position in metres plus that of the direction, which is close to radians."""
+    """Return the error of the position in metres plus that of the direction, which is close to radians."""
     position = distance(outputs[:, :2], target[:, :2])
     return SCALE_M * position + direction_loss(outputs[:, 2:], target[:, 2:])
 
 
 def _to_values(columns: Floats, centroids: Points) -> Floats:
-    """A manifest holds the yaw of the wall, the network predicts that of its normal."""
+    """Convert the position, and the yaw of the wall, which the manifest holds, to that of its normal."""
     position = columns[:, :2] - centroids[:, :2]
     normal = np.radians(columns[:, 2] + 90)
     return np.column_stack([position / SCALE_M, np.arctan2(np.sin(normal), np.cos(normal))])

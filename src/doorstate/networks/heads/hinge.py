@@ -19,7 +19,7 @@ def _parse(side: str) -> float:
 
 
 def _augment(target: Values, draw: AugmentationDraw) -> NDArray[np.floating]:
-    """A mirrored door is hinged on the other side."""
+    """Swap the sides of mirrored doors."""
     _, determinant = plan_transform(draw)
     return np.where(determinant[:, None] < 0, 1 - target, target)
 

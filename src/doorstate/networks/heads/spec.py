@@ -72,9 +72,9 @@ class HeadSpec:
     """Head that predicts one small vector per cloud.
 
     Args:
-        name: in configurations, weights cards and exported files.
-        description: of the values, for users of an exported file.
-        columns: of the table of outputs, one for each value.
+        name: name in configurations, weights cards and exported files.
+        description: meaning of the values, for users of an exported file.
+        columns: columns of the table of outputs, one for each value.
         num_outputs: size of the last linear layer.
         decode: (B, num_outputs) outputs to (B, num_values) values.
         loss: (B, num_outputs) outputs and (B, num_values) targets without NaN to (B,) losses.
@@ -119,7 +119,7 @@ class PointHeadSpec:
     """Head that classifies every point; its layers belong to the network (`PointNetwork.part_branch`).
 
     Args:
-        name: as of `HeadSpec`.
+        name: name in configurations, weights cards and run folders.
         classes: names of the classes.
         target: (M, n) stored classes to (M, n) int64 targets, negative where unknown.
         loss: (B, n, C) logits and (B, n) targets to a scalar, the mean over the points with a target.

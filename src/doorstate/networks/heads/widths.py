@@ -23,7 +23,7 @@ def _decode(outputs: Tensor) -> Tensor:
 
 
 def _loss(outputs: Tensor, target: Tensor) -> Tensor:
-    """Sum of the absolute errors in metres."""
+    """Return the sum of the absolute errors in metres."""
     return SCALE_M * (outputs - target).abs().sum(dim=1)
 
 
@@ -36,7 +36,7 @@ def _to_columns(values: Floats, centroids: Points) -> Floats:
 
 
 def _augment(target: Values, draw: AugmentationDraw) -> NDArray[np.floating]:
-    """Widths grow with the scale of the plan."""
+    """Scale the widths with the plan."""
     _, determinant = plan_transform(draw)
     return target * np.sqrt(np.abs(determinant))[:, None]
 

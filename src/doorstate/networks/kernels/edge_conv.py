@@ -20,7 +20,7 @@ from doorstate.networks.kernels.neighbour_sum import neighbour_sum
 
 
 def edge_max(features: Tensor, indices: Tensor, weight: Tensor, bias: Tensor) -> Tensor:
-    """Maximum over the neighbours j of W [x_j - x_i; x_i] + b.
+    """Return the maximum over the neighbours j of W [x_j - x_i; x_i] + b.
 
     Args:
         features: (B, N, C) x.

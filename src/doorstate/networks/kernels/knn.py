@@ -12,10 +12,10 @@ from torch import Tensor
 from doorstate.networks.kernels.distances import coordinate_distances, feature_distances
 from doorstate.networks.kernels.gather import gather_rows
 from doorstate.networks.kernels.knn_blocks import nearest_in_blocks
+from doorstate.networks.kernels.pieces import pieces
 from doorstate.networks.kernels.precision import at_least_float32, full_precision
 from doorstate.networks.kernels.spatial_order import BLOCK_SIZES, block_size, spatial_order
 
-_DISTANCES_PER_BLOCK = 2**19  # 2 MiB of float32 stay in a core's cache
 _FEWEST_POINTS = 1024  # below, all distances are cheaper than choosing which to compute
 
 
@@ -61,18 +61,16 @@ def _blocks_are_faster(query: Tensor, points: Tensor, k: int) -> bool:
 def _nearest_of_all(query: Tensor, points: Tensor, k: int) -> Tensor:
     """Search by all distances: of coordinates by exact differences, of features by a matrix product."""
     squared_distances = coordinate_distances if points.shape[2] == 3 else feature_distances
-    block_size = max(1, _DISTANCES_PER_BLOCK // points.shape[1])
-    if torch.compiler.is_exporting():  # a graph would hold every block's operations
-        block_size = query.shape[1]
+    num_queries, num_points = query.shape[1], points.shape[1]
+    # A graph would hold the operations of every piece.
+    exporting = torch.compiler.is_exporting()
     neighbours = []
-    for start in range(0, query.shape[1], block_size):
-        block = query[:, start : start + block_size]
-        distances = squared_distances(block, points)  # (B, m, N)
-        twins = points[
-            :, start : start + block.shape[1]
-        ]  # fewer than the block, or none, if there are more queries than points
-        same = (block[:, : twins.shape[1]] == twins).all(-1, keepdim=True)  # (B, m, 1)
-        same_index = torch.arange(start, start + twins.shape[1], device=points.device)  # (m,)
+    for piece in [slice(0, num_queries)] if exporting else pieces(num_queries, num_points):
+        queries = query[:, piece]
+        distances = squared_distances(queries, points)  # (B, m, N)
+        twins = points[:, piece]  # fewer than the queries, or none, if there are more queries than points
+        same = (queries[:, : twins.shape[1]] == twins).all(-1, keepdim=True)  # (B, m, 1)
+        same_index = torch.arange(piece.start, piece.start + twins.shape[1], device=points.device)  # (m,)
         column = same_index.view(1, -1, 1).expand_as(same)
         with_twin = distances[:, : twins.shape[1]]
         with_twin.scatter_(2, column, torch.where(same, -torch.inf, with_twin.gather(2, column)))

@@ -17,9 +17,9 @@ from math import ceil
 import torch
 from torch import Tensor
 
+from doorstate.networks.kernels.pieces import VALUES_PER_PIECE
 from doorstate.networks.kernels.spatial_order import block_size
 
-_DISTANCES_PER_BLOCK = 2**19  # 2 MiB of float32 stay in a core's cache
 _ROUNDING = 1e-5  # of squared float32 distances, relative to the largest squared norm; ten times what is seen
 _FAR, _NO_LABEL = 1e30, 2**31 - 1
 
@@ -104,6 +104,6 @@ def _chunks(order: Tensor, count: Tensor, pairs: int) -> Iterator[tuple[Tensor, 
     stop = len(counts)
     while stop > 0:
         width = counts[stop - 1]
-        start = max(0, stop - max(1, _DISTANCES_PER_BLOCK // (width * pairs)))
+        start = max(0, stop - max(1, VALUES_PER_PIECE // (width * pairs)))
         yield order[start:stop], width
         stop = start

@@ -21,7 +21,7 @@ from doorstate.networks.kernels.pieces import pieces
 from doorstate.networks.kernels.precision import autocast_type, full_precision, wants_gradient
 from doorstate.networks.kernels.winners import first_winner
 
-_GROUP = 64  # points of which only the largest are compared further
+_GROUP = 64  # points; only the largest of a group is compared further
 
 
 def linear_max(rows: Tensor, weight: Tensor, bias: Tensor) -> Tensor:

@@ -35,7 +35,7 @@ def linear_norm_max(
         weight: (C', C).
         scale: (C',) of the normalisation, of either sign.
         shift: (C',) of the normalisation.
-        eps: of the normalisation.
+        eps: epsilon of the normalisation.
 
     Returns:
         (G, C') in the type of autocast; (C',) mean and (C',) variance, divided by G K, of W x, without gradient.

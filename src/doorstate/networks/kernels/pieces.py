@@ -5,10 +5,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-_VALUES_PER_PIECE = 2**19  # 2 MiB of float32
+VALUES_PER_PIECE = 2**19  # 2 MiB of float32
 
 
 def pieces(count: int, values_each: int) -> Iterator[slice]:
     """Yield slices of `count` items, `values_each` numbers per item, that each fit the cache."""
-    size = max(1, _VALUES_PER_PIECE // values_each)
+    size = max(1, VALUES_PER_PIECE // values_each)
     return (slice(start, min(start + size, count)) for start in range(0, count, size))

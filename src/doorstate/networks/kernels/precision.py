@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Number types under autocast: sums and coordinates keep float32, products use the type autocast asks for."""
+"""Number types under autocast: sums and coordinates keep float32, products use the type of autocast."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def autocast_type(tensor: Tensor) -> torch.dtype:
 
 
 def wants_gradient(*tensors: Tensor) -> bool:
-    """Tell if autograd records operations on any of the tensors."""
+    """Return True if autograd records operations on any of the tensors."""
     return torch.is_grad_enabled() and any(tensor.requires_grad for tensor in tensors)
 
 

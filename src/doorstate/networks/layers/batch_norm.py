@@ -36,7 +36,7 @@ class RowBatchNorm(nn.BatchNorm1d):
         return self(outputs) if linear.bias is None else self.add_bias_and_normalize(outputs, linear.bias)
 
     def max_after_linear(self, linear: nn.Linear, groups: Tensor) -> Tensor:
-        """Maximum over the points of the normalised outputs of a linear layer; for training.
+        """Return the maximum over the points of the normalised outputs of a linear layer; for training.
 
         Args:
             linear: layer with a bias.
@@ -78,7 +78,7 @@ class RowBatchNorm(nn.BatchNorm1d):
         """Fold the normalisation into the linear layer before it.
 
         Args:
-            linear: the layer before.
+            linear: layer before the normalisation.
             moments: (C,) mean and (C, C) covariance of the batch's inputs; None takes the running statistics.
             count: number of inputs behind the moments.
             dtype: type to which the weight will be rounded; the mean of the outputs is then computed with rounded

@@ -71,7 +71,7 @@ class PointMLP(nn.Module):
     def forward(
         self, offsets: Tensor, features: Tensor | None = None, indices: Tensor | None = None
     ) -> Tensor:
-        """Return (B, ..., channels[-1]); arguments as of `PointLinear.forward`."""
+        """Return (B, ..., channels[-1]); arguments as in `PointLinear.forward`."""
         rows: Tensor = self.rest(self._first_layer(offsets, features, indices))
         return rows
 
@@ -124,6 +124,6 @@ class PooledMLP(nn.Module):
     def forward(
         self, offsets: Tensor, features: Tensor | None = None, indices: Tensor | None = None
     ) -> Tensor:
-        """Return (B, ..., channels[-1]) without the axis before the last; arguments as of `PointLinear.forward`."""
+        """Return (B, ..., channels[-1]) without the axis before the last; arguments as in `PointLinear.forward`."""
         pooled: Tensor = self.pool(self.mlp(offsets, features, indices))
         return pooled

@@ -31,8 +31,8 @@ def draw_paper_scene(
     """Draw one pose of the half-ring and an opening for each state.
 
     Args:
-        seed: of the data set.
-        index: of the position in `half_ring()`.
+        seed: seed of the data set.
+        index: number of the position in `half_ring()`.
         door: the door of all scenes.
         angles_deg: range of opening angles for each state.
     """

@@ -30,7 +30,7 @@ class ConstantAxial(FrozenModel):
         Args:
             depth_m: (H, W) metres.
             incidence_rad: (H, W), from `render.incidence`.
-            focal_px: of the camera.
+            focal_px: focal length of the camera.
 
         Returns:
             (H, W) metres.

@@ -37,12 +37,12 @@ def loss_shares(
     """Return the probability of each pixel to be lost on its material.
 
     Args:
-        materials: shares.
+        materials: shares of lost pixels.
         rendered: result of `render_behind_glass`.
-        incidence_rad: (H, W), of the same rendering.
-        boxes: of the scene, with the glass.
-        pose: of the camera.
-        intrinsics: of the camera.
+        incidence_rad: (H, W), `render.incidence` of the same rendering.
+        boxes: scene in the door frame, with the glass.
+        pose: camera in the door frame.
+        intrinsics: pinhole model of the camera.
 
     Returns:
         (H, W), or None if every box is matte.

@@ -75,12 +75,12 @@ def sense(
     """Return the sensor's measurement of a rendering, cut to the camera's range.
 
     Args:
-        model: of the sensor.
+        model: sensor model.
         rendered: result of `render_behind_glass` for the boxes, pose and camera.
-        boxes: of the scene, with the glass.
-        pose: of the camera.
-        camera: of the model, or another one.
-        seed: of the sample (`streams.sample_seed`).
+        boxes: scene in the door frame, with the glass.
+        pose: camera in the door frame.
+        camera: camera of the model, or another one.
+        seed: seed of the sample (`streams.sample_seed`).
 
     Returns:
         Depth NaN, part NONE and box NO_BOX where nothing is measured; at ragged edges parts move with the depth.
@@ -101,7 +101,14 @@ def distort(
     Arguments are those of `sense`. A lost pixel stays lost in every later stage.
     """
     angle_rad = _incidence(model, rendered, boxes, pose, intrinsics)
-    rendered = _hide(model, rendered, angle_rad, boxes, pose, intrinsics, seed)
+    if model.materials is not None:
+        shares = loss_shares(model.materials, rendered, angle_rad, boxes, pose, intrinsics)
+        if shares is not None:
+            patch_px, rng = model.materials.patch_px, stage_rng(seed, "materials")
+            rendered = rendered._replace(depth_m=lose_patches(rendered.depth_m, shares, patch_px, rng))
+    if model.second_view is not None:
+        depth_m = hide_from_second_view(rendered.depth_m, model.second_view, intrinsics.fx)
+        rendered = rendered._replace(depth_m=depth_m)
     if model.lateral is not None:
         moves = draw_moves(rendered, angle_rad, model.lateral, stage_rng(seed, "lateral"))
         rendered = Render(
@@ -137,26 +144,6 @@ def _incidence(
         np.rint(incidence(rendered, boxes, pose, intrinsics) * _ANGLE_STEPS) / _ANGLE_STEPS
     )
     return rounded
-
-
-def _hide(
-    model: SensorModel,
-    rendered: Render,
-    angle_rad: NDArray[np.float32],
-    boxes: Sequence[Box],
-    pose: CameraPose,
-    intrinsics: Intrinsics,
-    seed: int,
-) -> Render:
-    depth_m = rendered.depth_m
-    if model.materials is not None:
-        shares = loss_shares(model.materials, rendered, angle_rad, boxes, pose, intrinsics)
-        if shares is not None:
-            rng = stage_rng(seed, "materials")
-            depth_m = lose_patches(depth_m, shares, model.materials.patch_px, rng)
-    if model.second_view is not None:
-        depth_m = hide_from_second_view(depth_m, model.second_view, intrinsics.fx)
-    return rendered._replace(depth_m=depth_m)
 
 
 def _with_axial_noise(

@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple
 from doorstate.types import Part
 
 Material = Literal["matte", "gloss", "dark", "glass"]
-"""How a surface returns a depth camera's light (simulation.noise.materials)."""
+"""Kind of surface, by its return of a depth camera's light (simulation.noise.materials)."""
 
 
 class Box(NamedTuple):

@@ -36,7 +36,7 @@ def passable_width_m(door: Door, opening: Opening) -> float:
 
 
 def free_angle_deg(door: Door, obstacles: list[Box]) -> int:
-    """Return how far the leaves turn, up to 170 degrees in steps of 5, before they hit an obstacle or their frame."""
+    """Return the angle, up to 170 degrees in steps of 5, by which the leaves turn until they hit something fixed."""
     fixed = [*fixed_boxes(door), *obstacles]
     for angle in range(_STEP_DEG, _WIDEST_DEG + 1, _STEP_DEG):
         if collide(leaf_boxes(door, Opening(angle_deg=angle, passive_angle_deg=angle)), fixed):

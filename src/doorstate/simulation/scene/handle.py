@@ -30,7 +30,7 @@ def handle_boxes(handle: Handle, leaf_width_m: float, face_y_m: float, side: int
 
     Args:
         handle: kind and sizes.
-        leaf_width_m: of the leaf.
+        leaf_width_m: width of the leaf.
         face_y_m: y of the face.
         side: direction of the face's normal, 1 for +y and -1 for -y.
     """

@@ -49,7 +49,7 @@ def leaf_slab(door: Door, width_m: float) -> Box:
 
 
 def sliding_overlap_m(door: Door) -> float:
-    """Return by how much a sliding leaf in front of the wall covers it on each side; 0 in a pocket."""
+    """Return the width of wall that a sliding leaf covers on each side; 0 for a leaf in a pocket."""
     return SLIDING_OVERLAP_M if door.leaf_recess_m < 0 else 0.0
 
 
