@@ -24,7 +24,7 @@ def clouds(num_points: int = 160) -> Tensor:
 
 
 def targets(num_points: int = 160) -> dict[str, Tensor]:
-    """Of three clouds, the second without a door."""
+    """Targets of three clouds, the second without a door."""
     nan = math.nan
     return {
         "door": torch.tensor([[1.0], [0.0], [1.0]]),
