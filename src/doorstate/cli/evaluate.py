@@ -11,27 +11,20 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from doorstate.cli.options import (
-    Cx,
-    Cy,
-    DepthScale,
-    Frame,
-    Fx,
-    Fy,
-    IntrinsicsFile,
     LayoutName,
     PointCount,
-    Roll,
-    Units,
-    read_options,
 )
+from doorstate.cli.reading_options import check_layout, with_reading_options
 from doorstate.errors import CloudReadError, ConfigError
 
 if TYPE_CHECKING:
     from doorstate.evaluation.frames import Predictors
+    from doorstate.io.options import ReadOptions
 
 _DOOR_COLUMN = "door"
 
 
+@with_reading_options
 def evaluate(
     folder: Annotated[
         Path,
@@ -67,15 +60,8 @@ def evaluate(
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the metrics as one JSON object.")] = False,
     layout: LayoutName = None,
-    frame: Frame = "body",
-    roll: Roll = 0,
-    units: Units = "m",
-    depth_scale: DepthScale = 0.001,
-    intrinsics: IntrinsicsFile = None,
-    fx: Fx = None,
-    fy: Fy = None,
-    cx: Cx = None,
-    cy: Cy = None,
+    *,
+    options: ReadOptions,
 ) -> None:
     """Score networks and rules on labelled recordings.
 
@@ -101,7 +87,7 @@ def evaluate(
 
     if everything and out is None:
         raise ConfigError("--all needs --out")
-    options = read_options(frame, roll, units, depth_scale, intrinsics, (fx, fy, cx, cy), layout)
+    check_layout(layout, options)
     frames = labelled_frames(folder, options, layout)
     if group is None and any(frame.columns.get(_DOOR_COLUMN) for frame in frames):
         group = _DOOR_COLUMN

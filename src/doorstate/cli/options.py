@@ -5,33 +5,12 @@ from __future__ import annotations
 
 import tomllib
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
-from doorstate.errors import CameraError, ConfigError
+from doorstate.errors import ConfigError
 
-if TYPE_CHECKING:
-    from doorstate.io.options import ReadOptions
-
-# How cloud files and depth images are read.
-Frame = Annotated[
-    str,
-    typer.Option(help="Axes of cloud files: body (x forward, y left, z up) or optical (z forward, y down)."),
-]
-Roll = Annotated[
-    int, typer.Option(help="Clockwise rotation of the camera, seen from behind: 0, 90, 180 or 270 degrees.")
-]
-Units = Annotated[str, typer.Option(help="Length unit of cloud files: m, dm, cm, mm or km.")]
-DepthScale = Annotated[float, typer.Option(help="Metres per unit of depth images.")]
-IntrinsicsFile = Annotated[
-    Path | None,
-    typer.Option("--intrinsics", help="Camera of depth images: a JSON file, or a ROS camera_info YAML file."),
-]
-Fx = Annotated[float | None, typer.Option(help="Horizontal focal length in pixels, instead of --intrinsics.")]
-Fy = Annotated[float | None, typer.Option(help="Vertical focal length in pixels.")]
-Cx = Annotated[float | None, typer.Option(help="Horizontal image centre in pixels.")]
-Cy = Annotated[float | None, typer.Option(help="Vertical image centre in pixels.")]
 LayoutName = Annotated[
     str | None,
     typer.Option("--layout", help="Folder layout of a published data set: deepdoors2 (or DeepDoors)."),
@@ -110,39 +89,6 @@ def check_source(files: list[Path] | None, bag: Path | None) -> None:
     """
     if bool(files) == (bag is not None):
         raise ConfigError("give either files or --bag")
-
-
-def read_options(
-    frame: str,
-    roll: int,
-    units: str,
-    depth_scale: float,
-    intrinsics_file: Path | None,
-    flags: tuple[float | None, float | None, float | None, float | None],
-    layout: str | None = None,
-) -> ReadOptions:
-    """Return the reading options that a user typed.
-
-    Args:
-        flags: --fx, --fy, --cx and --cy in pixels.
-
-    Raises:
-        ConfigError: an option has no such value, or options exclude each other.
-    """
-    from doorstate.io.camera import pinhole_from_numbers, read_intrinsics
-    from doorstate.io.options import ReadOptions, metres_per_unit
-
-    if layout is not None and (frame, roll, units, depth_scale) != ("body", 0, "m", 0.001):
-        raise ConfigError("--frame, --roll, --units and --depth-scale cannot be combined with --layout")
-    intrinsics = None if intrinsics_file is None else read_intrinsics(intrinsics_file)
-    try:
-        pinhole = pinhole_from_numbers(*flags)
-        if intrinsics is not None and pinhole is not None:
-            raise ConfigError("give either --intrinsics or --fx --fy --cx --cy")
-        camera = intrinsics or pinhole
-        return ReadOptions(frame, roll, camera, depth_scale, metres_per_unit(units))  # type: ignore[arg-type]
-    except CameraError as error:  # typed values are usage errors, unlike those of a camera file
-        raise ConfigError(error.message, field=error.field, expected=error.expected) from error
 
 
 def split_names(text: str | None) -> tuple[str, ...] | None:

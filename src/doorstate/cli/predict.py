@@ -14,24 +14,15 @@ from doorstate.cli.options import (
     Bag,
     BudgetMs,
     CameraInfoTopic,
-    Cx,
-    Cy,
-    DepthScale,
-    Frame,
-    Fx,
-    Fy,
-    IntrinsicsFile,
     Network,
     PointCount,
-    Roll,
     RuleName,
     Topic,
-    Units,
     Weights,
     check_source,
-    read_options,
 )
 from doorstate.cli.prediction_output import WRITERS, open_output
+from doorstate.cli.reading_options import with_reading_options
 from doorstate.errors import ConfigError, DoorstateError
 
 if TYPE_CHECKING:
@@ -39,6 +30,7 @@ if TYPE_CHECKING:
     from doorstate.io.options import ReadOptions
 
 
+@with_reading_options
 def predict(
     files: Annotated[
         list[Path] | None, typer.Argument(help="Clouds, depth images, or folders of them.")
@@ -56,15 +48,8 @@ def predict(
     out: Annotated[
         Path | None, typer.Option(help="Write the predictions to this .csv or .jsonl file.")
     ] = None,
-    frame: Frame = "body",
-    roll: Roll = 0,
-    units: Units = "m",
-    depth_scale: DepthScale = 0.001,
-    intrinsics: IntrinsicsFile = None,
-    fx: Fx = None,
-    fy: Fy = None,
-    cx: Cx = None,
-    cy: Cy = None,
+    *,
+    options: ReadOptions,
 ) -> None:
     """Predict the state of the door in clouds.
 
@@ -93,7 +78,6 @@ def predict(
         raise ConfigError("--json cannot be combined with --out; a .jsonl file holds JSON lines")
     if out is not None and out.suffix not in WRITERS:
         raise ConfigError(f"--out {out}: expected a {' or '.join(WRITERS)} file")
-    options = read_options(frame, roll, units, depth_scale, intrinsics, (fx, fy, cx, cy))
     paths = find_clouds(files or [])
     load = partial(load_predictor, network, weights, rule, points, budget_ms=budget_ms)
     if bag is None:

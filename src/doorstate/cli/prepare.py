@@ -9,31 +9,24 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from doorstate.cli.options import (
-    Cx,
-    Cy,
-    DepthScale,
-    Frame,
-    Fx,
-    Fy,
-    IntrinsicsFile,
     LayoutName,
     MaxDepth,
     PreparedPoints,
-    Roll,
     ShardOption,
     Thin,
-    Units,
     Workers,
-    read_options,
 )
+from doorstate.cli.reading_options import check_layout, with_reading_options
 from doorstate.errors import ConfigError
 
 if TYPE_CHECKING:
     from doorstate.dataset.prepare import PreparationSummary
+    from doorstate.io.options import ReadOptions
 
 _MAX_LISTED = 10  # rejected clouds
 
 
+@with_reading_options
 def prepare(
     source: Annotated[
         Path, typer.Argument(help="Simulated folder, or folder with one sub-folder of clouds for each state.")
@@ -46,20 +39,13 @@ def prepare(
             help="CSV file with the poses of clouds in state folders: file,x_m,y_m or file,distance_m,robot_angle_deg."
         ),
     ] = None,
-    frame: Frame = "body",
-    roll: Roll = 0,
-    units: Units = "m",
-    depth_scale: DepthScale = 0.001,
-    intrinsics: IntrinsicsFile = None,
-    fx: Fx = None,
-    fy: Fy = None,
-    cx: Cx = None,
-    cy: Cy = None,
     workers: Workers = None,
     shard: ShardOption = None,
     layout: LayoutName = None,
     max_depth: MaxDepth = None,
     thin: Thin = False,
+    *,
+    options: ReadOptions,
 ) -> None:
     """Clean and sort clouds for training.
 
@@ -80,7 +66,7 @@ def prepare(
     from doorstate.dataset.preparation import Preparation
     from doorstate.dataset.prepare import prepare_dataset, prepare_shard
 
-    options = read_options(frame, roll, units, depth_scale, intrinsics, (fx, fy, cx, cy), layout)
+    check_layout(layout, options)
     if layout is not None and poses is not None:
         raise ConfigError("--poses cannot be combined with --layout")
     spec = CloudSpec(num_points=points, thin=thin, max_depth_m=max_depth)

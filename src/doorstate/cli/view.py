@@ -14,23 +14,14 @@ import typer
 from doorstate.cli.options import (
     Bag,
     CameraInfoTopic,
-    Cx,
-    Cy,
-    DepthScale,
-    Frame,
-    Fx,
-    Fy,
-    IntrinsicsFile,
     Network,
     PointCount,
-    Roll,
     RuleName,
     Topic,
-    Units,
     Weights,
     check_source,
-    read_options,
 )
+from doorstate.cli.reading_options import with_reading_options
 from doorstate.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -43,6 +34,7 @@ Clouds = tuple[Iterable["NamedCloud"], int]
 """Clouds and their number."""
 
 
+@with_reading_options
 def view(
     files: Annotated[
         list[Path] | None,
@@ -78,15 +70,8 @@ def view(
     bag: Bag = None,
     topic: Topic = None,
     camera_info_topic: CameraInfoTopic = None,
-    frame: Frame = "body",
-    roll: Roll = 0,
-    units: Units = "m",
-    depth_scale: DepthScale = 0.001,
-    intrinsics: IntrinsicsFile = None,
-    fx: Fx = None,
-    fy: Fy = None,
-    cx: Cx = None,
-    cy: Cy = None,
+    *,
+    options: ReadOptions,
 ) -> None:
     """Show clouds and predictions in the browser.
 
@@ -116,7 +101,6 @@ def view(
         if out.suffix not in (".html", ".htm"):
             raise ConfigError(f"--out {out}: expected a .html file")
         check_writable(out)
-    options = read_options(frame, roll, units, depth_scale, intrinsics, (fx, fy, cx, cy))
     source: AbstractContextManager[Clouds]
     if bag is not None:
         source = _open_bag(bag, topic, camera_info_topic, options, every, live, rate)

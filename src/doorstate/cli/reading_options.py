@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Options of how clouds are read, which `predict`, `view`, `evaluate` and `prepare` share."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from dataclasses import replace
+from functools import wraps
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
+
+import typer
+
+from doorstate.errors import CameraError, ConfigError
+
+if TYPE_CHECKING:
+    from doorstate.io.options import ReadOptions
+
+
+def read_options(
+    frame: Annotated[
+        str,
+        typer.Option(
+            help="Axes of cloud files: body (x forward, y left, z up) or optical (z forward, y down)."
+        ),
+    ] = "body",
+    roll: Annotated[
+        int,
+        typer.Option(help="Clockwise rotation of the camera, seen from behind: 0, 90, 180 or 270 degrees."),
+    ] = 0,
+    units: Annotated[str, typer.Option(help="Length unit of cloud files: m, dm, cm, mm or km.")] = "m",
+    depth_scale: Annotated[float, typer.Option(help="Metres per unit of depth images.")] = 0.001,
+    intrinsics: Annotated[
+        Path | None, typer.Option(help="Camera of depth images: a JSON file, or a ROS camera_info YAML file.")
+    ] = None,
+    fx: Annotated[
+        float | None, typer.Option(help="Horizontal focal length in pixels, instead of --intrinsics.")
+    ] = None,
+    fy: Annotated[float | None, typer.Option(help="Vertical focal length in pixels.")] = None,
+    cx: Annotated[float | None, typer.Option(help="Horizontal image centre in pixels.")] = None,
+    cy: Annotated[float | None, typer.Option(help="Vertical image centre in pixels.")] = None,
+) -> ReadOptions:
+    """Return the reading options that a user typed.
+
+    Raises:
+        ConfigError: an option has no such value, or options exclude each other.
+    """
+    from doorstate.io.camera import pinhole_from_numbers, read_intrinsics
+    from doorstate.io.options import ReadOptions, metres_per_unit
+
+    camera = None if intrinsics is None else read_intrinsics(intrinsics)
+    try:
+        pinhole = pinhole_from_numbers(fx, fy, cx, cy)
+        if camera is not None and pinhole is not None:
+            raise ConfigError("give either --intrinsics or --fx --fy --cx --cy")
+        return ReadOptions(frame, roll, camera or pinhole, depth_scale, metres_per_unit(units))  # type: ignore[arg-type]
+    except CameraError as error:  # typed values are usage errors, unlike those of a camera file
+        raise ConfigError(error.message, field=error.field, expected=error.expected) from error
+
+
+def with_reading_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Add the options of `read_options` to a command, which gets their result as its parameter `options`.
+
+    typer makes the options of a command from its signature.
+    """
+    # The class is imported only when a command runs, so that `--help` is quick.
+    hints = get_type_hints(command, localns={"ReadOptions": Any}, include_extras=True)
+    own = inspect.signature(command).parameters.values()
+    shared = inspect.signature(read_options).parameters.values()
+    shared_hints = get_type_hints(read_options, localns={"ReadOptions": Any}, include_extras=True)
+    parameters = [
+        *(
+            parameter.replace(annotation=hints[parameter.name])
+            for parameter in own
+            if parameter.name != "options"
+        ),
+        *(parameter.replace(annotation=shared_hints[parameter.name]) for parameter in shared),
+    ]
+
+    @wraps(command)
+    def run(**values: Any) -> None:
+        shared_values = {parameter.name: values.pop(parameter.name) for parameter in shared}
+        command(**values, options=read_options(**shared_values))
+
+    run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    run.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+    return run
+
+
+def check_layout(layout: str | None, options: ReadOptions) -> None:
+    """Check that frame, roll, units and depth scale are left to the layout of a published data set.
+
+    Raises:
+        ConfigError: one of them was given too.
+    """
+    from doorstate.io.options import DEFAULT_OPTIONS
+
+    if layout is not None and replace(options, intrinsics=None) != DEFAULT_OPTIONS:
+        raise ConfigError("--frame, --roll, --units and --depth-scale cannot be combined with --layout")
