@@ -66,9 +66,8 @@ class _DGCNNPort(nn.Module):
         source = file.read_text(encoding="utf-8").replace("torch.device('cuda')", "x.device")
         module = ModuleType("dgcnn_port")
         exec(compile(source, str(file), "exec"), module.__dict__)
-        build: Any = (
-            getattr(module, "DGCNN_cls", None) or module.DGCNN
-        )  # older versions have the shorter name
+        # Older versions have the shorter name.
+        build: Any = getattr(module, "DGCNN_cls", None) or module.DGCNN
         arguments = SimpleNamespace(k=20, emb_dims=1024, dropout=0.5)
         self.network = build(arguments, output_channels=len(STATES))
 

@@ -52,9 +52,9 @@ def model_card(path: Path, card: WeightsCard, parameters: int, training: Trainin
 
     Args:
         path: weights file.
-        card: inside the file.
-        parameters: of the network.
-        training: run that gave the weights.
+        card: card in the file.
+        parameters: number of parameters of the network.
+        training: run that trained the weights.
         evidence: published scores.
     """
     from .pages.render import render_template

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Commands of `doorstate` as subprocesses in the repository, printed as anybody can type them."""
+"""Commands of `doorstate` as subprocesses in the repository, printed as a user can type them."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from doorstate.dataset.store import is_prepared
 from .paths import REPOSITORY
 
 
-def doorstate(arguments: str, prepared: Path | None = None) -> None:
+def run_doorstate(arguments: str, prepared: Path | None = None) -> None:
     """Print and run one command; exit with its code if it fails.
 
     Args:
-        arguments: after `doorstate`.
+        arguments: command and options, without `doorstate`.
         prepared: data set that the command makes. If it exists afterwards, exit code 1 means that some clouds were
             left out, which is no failure.
     """

@@ -76,14 +76,14 @@ class Command(NamedTuple):
     prepared: Path
 
 
-def commands(prepared: Path) -> Iterator[Command]:
+def dataset_commands(prepared: Path) -> Iterator[Command]:
     """Yield the commands that make a data set, in order; a command whose work is done costs nothing.
 
     Args:
         prepared: folder `data/NAME-POINTS`.
 
     Raises:
-        KeyError: no such data set.
+        KeyError: there is no such data set.
     """
     name, _, points = prepared.name.rpartition("-")
     if name not in JOINED:
@@ -93,6 +93,6 @@ def commands(prepared: Path) -> Iterator[Command]:
     elif not is_prepared(prepared):
         parts = [prepared.with_name(f"{part}-{points}") for part in JOINED[name]]
         for part in parts:
-            yield from commands(part)
+            yield from dataset_commands(part)
         joined = " ".join(f"data/{part.name}" for part in parts)
         yield Command(f"join {joined} --out data/{name}-{points}", prepared)

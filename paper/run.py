@@ -11,8 +11,8 @@ from doorstate.training.experiment import load_experiment
 from doorstate.training.run_folder import RunFolder, run_of
 
 from . import paths
-from .commands import doorstate
-from .datasets import commands
+from .commands import run_doorstate
+from .datasets import dataset_commands
 from .definition import read_definition
 from .published import comparison
 
@@ -24,11 +24,11 @@ def run(name: str) -> None:
         if not is_finished(start):
             run(start)
     for dataset in definition.datasets:
-        for command in commands(paths.REPOSITORY / dataset):
-            doorstate(command.arguments, command.prepared)
-    doorstate(f"{definition.command} paper/experiments/{name}.toml --jobs 2")
+        for command in dataset_commands(paths.REPOSITORY / dataset):
+            run_doorstate(command.arguments, command.prepared)
+    run_doorstate(f"{definition.command} paper/experiments/{name}.toml --jobs 2")
     if not definition.is_study and definition.content.get("protocol") != "all":
-        doorstate(f"report runs/{name}")
+        run_doorstate(f"report runs/{name}")
 
 
 def is_finished(name: str) -> bool:
@@ -45,9 +45,9 @@ def repeat_run(network: str, fold: int, name: str = "paper") -> tuple[float, flo
     """Train one published run from nothing.
 
     Args:
-        network: of the comparison.
-        fold: of the run.
-        name: published comparison.
+        network: network of the comparison.
+        fold: fold of the run.
+        name: name of the published comparison.
 
     Returns:
         Test macro F1 now, the published one, and the allowed difference: twice the sample standard deviation over the

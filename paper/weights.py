@@ -31,10 +31,9 @@ from .cards import Training, model_card
 from .definition import Definition, read_definitions
 from .published import comparison, study
 
-FEWEST_POINTS, LARGEST_LOSS = (
-    1024,
-    0.002,
-)  # default points: not fewer, and no larger loss of macro F1 on unseen samples
+# Weights have as few default points as lose at most this macro F1 on unseen samples, but not fewer than 1024.
+FEWEST_POINTS = 1024
+LARGEST_LOSS = 0.002
 WRONG_SHARE = 0.05  # of validation samples with a state; a smaller share leaves few of them (paper/log.md)
 RECIPE_PROTOCOLS = ("paper", "by-pose")
 
@@ -47,7 +46,7 @@ class Evidence:
         temperature: divides the logits.
         abstain_below: probability below which the weights abstain.
         default_points: number of points that loses nothing; None if no study tells.
-        calibration_error: after scaling.
+        calibration_error: expected calibration error after scaling.
         comparisons: published results to show on the card.
         named: share of tested doors that are given a state, and share of these that is correct; None without threshold.
     """
@@ -66,10 +65,10 @@ def package_weights(
     """Store the trained networks of `runs/EXPERIMENT` as float16, with a model card beside each.
 
     Args:
-        experiment: whose results are published, unless its protocol is `all`.
-        prefix: before the network's name in the name of the file.
-        networks: to store; all that are trained if empty.
-        out: folder; that of the package if not given.
+        experiment: name of an experiment with published results, unless its protocol is `all`.
+        prefix: text before the network's name in the name of the file.
+        networks: networks to store; all that are trained if empty.
+        out: folder to write; that of the package if not given.
 
     Returns:
         Paths of the weights files.

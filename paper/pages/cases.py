@@ -15,10 +15,8 @@ from doorstate.types import ABSTAINED
 Case = Callable[[pd.DataFrame], "pd.Series[bool]"]
 """Return for each row of `Results.tested` whether it belongs to a case."""
 
-BORDERS_DEG, NEAR_BORDER_DEG = (
-    (15.0, 65.0, 75.0),
-    5.0,
-)  # semi-open 15 to 65 degrees, open 75 to 115 (data card)
+BORDERS_DEG = (15.0, 65.0, 75.0)  # semi-open 15 to 65 degrees, open 75 to 115 (docs/data-card.md)
+NEAR_BORDER_DEG = 5.0
 NEAR_M = 2.0
 FEW_LEAF_PX = 10_000  # of the 307,200 pixels of an image
 FEW_MEASURED_PX = 150_000
@@ -26,7 +24,7 @@ FROM_WALL_DEG = 45.0
 
 
 def near_border(rows: pd.DataFrame) -> pd.Series[bool]:
-    """Return whether the opening angle is within 5 degrees of the range of another state."""
+    """Return for each row whether its opening angle is within 5 degrees of the range of another state."""
     distance = np.abs(rows["opening_angle_deg"].to_numpy()[:, None] - np.array(BORDERS_DEG)).min(axis=1)
     return pd.Series(distance <= NEAR_BORDER_DEG, rows.index)
 

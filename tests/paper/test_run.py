@@ -26,8 +26,10 @@ DEFINITIONS = sorted(paths.EXPERIMENTS.glob("*.toml"))
 def called(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Commands that an experiment would run; a data set is `make NAME`."""
     lines: list[str] = []
-    monkeypatch.setattr(run, "doorstate", lambda arguments, prepared=None: lines.append(arguments))
-    monkeypatch.setattr(run, "commands", lambda folder: [datasets.Command(f"make {folder.name}", folder)])
+    monkeypatch.setattr(run, "run_doorstate", lambda arguments, prepared=None: lines.append(arguments))
+    monkeypatch.setattr(
+        run, "dataset_commands", lambda folder: [datasets.Command(f"make {folder.name}", folder)]
+    )
     return lines
 
 
@@ -82,7 +84,7 @@ def test_an_incomplete_data_set_is_used_and_a_failure_ends_the_program(
         (tmp_path / "dataset.json").touch()
     monkeypatch.setattr(commands.sys, "executable", str(tmp_path / "python"))
     with nullcontext() if goes_on else pytest.raises(SystemExit) as raised:
-        commands.doorstate("simulate", tmp_path)
+        commands.run_doorstate("simulate", tmp_path)
     if raised is not None:
         assert raised.value.code == exit_code
 
@@ -90,7 +92,7 @@ def test_an_incomplete_data_set_is_used_and_a_failure_ends_the_program(
 def test_data_sets_are_made_with_presets_and_sensors_that_exist(tmp_path: Path) -> None:
     seeds: dict[str, set[str]] = {}
     for name in datasets.SIMULATED:
-        (command,) = datasets.commands(tmp_path / f"{name}-4096")
+        (command,) = datasets.dataset_commands(tmp_path / f"{name}-4096")
         words = command.arguments.split()
         options = dict(pairwise(words))
         seed = options.get("--seed", "0")
@@ -114,13 +116,13 @@ def test_data_sets_are_made_with_presets_and_sensors_that_exist(tmp_path: Path) 
 
 
 def test_a_joined_data_set_is_made_of_its_parts_once(tmp_path: Path) -> None:
-    *parts, join = datasets.commands(tmp_path / "more-mixture-1024")
+    *parts, join = datasets.dataset_commands(tmp_path / "more-mixture-1024")
     assert all("--points 1024" in part.arguments for part in parts)
     assert [f"data/{part.prepared.name}" for part in parts] == join.arguments.split()[1:-2]
     assert join.arguments.endswith("--out data/more-mixture-1024")
     (tmp_path / "mixture-4096").mkdir()
     (tmp_path / "mixture-4096" / "dataset.json").touch()
-    assert list(datasets.commands(tmp_path / "mixture-4096")) == []
+    assert list(datasets.dataset_commands(tmp_path / "mixture-4096")) == []
 
 
 def test_a_published_run_is_repeated(small_dataset: PreparedDataset, folders: Path) -> None:

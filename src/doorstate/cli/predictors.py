@@ -21,7 +21,12 @@ def load_predictor(
     budget_ms: float | None = None,
     threads: int | None = None,
 ) -> Predictor:
-    """Load and warm up the network or rule that the options name; errors as of `Predictor.load`."""
+    """Load and warm up the network or rule that the options name.
+
+    Raises:
+        ConfigError: options exclude each other.
+        DoorstateError: see `Predictor.load`.
+    """
     from doorstate.inference.predictor import Predictor
 
     if sum(option is not None for option in (network, weights, rule)) > 1:

@@ -22,7 +22,7 @@ def check_predictions(results: Results, path_of: Callable[[str, int], Path]) -> 
     """Check every run of results.
 
     Args:
-        results: in any order of rows.
+        results: results to check, in any order of rows.
         path_of: file with the predictions of a method and fold, for errors.
 
     Raises:

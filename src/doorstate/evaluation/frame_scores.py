@@ -57,8 +57,8 @@ def score_frames(
 
     Args:
         predictions: N rows with columns method, state, predicted, the probabilities, and correct.
-        groups: N names; frames of one name depend on each other.
-        strata: by name, N values to score separately by.
+        groups: N names; frames with the same name depend on each other.
+        strata: N values to score separately by, by name of the stratum.
     """
     is_door = predictions["state"].isin(STATES)
     doors = predictions.assign(group=groups)[is_door]

@@ -24,7 +24,7 @@ def frame_tables(scores: FrameScores, group: str = NO_GROUP) -> dict[str, Table]
     """Build every table that has a row, by the name of its file.
 
     Args:
-        scores: of `frames.FrameResults.score`.
+        scores: result of `FrameResults.score`.
         group: column of the groups, such as `door`; `frame` if frames are independent.
     """
     tables = {
@@ -45,7 +45,7 @@ def frame_notes(scores: FrameScores, group: str = NO_GROUP) -> list[str]:
     """Return notes to read before the numbers.
 
     Args:
-        scores: of `frames.FrameResults.score`.
+        scores: result of `FrameResults.score`.
         group: as for `frame_tables`.
     """
     if not scores.frames:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Errors of further heads: presence of a door, opening angle, hinge side, frame pose, widths, parts of points."""
+"""Errors of the heads besides the state: door, opening angle, hinge side, frame pose, widths, parts of points."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def head_errors(rows: pd.DataFrame) -> dict[str, float]:
     A figure is NaN where the network has no such head or the manifest does not record the true values.
 
     Args:
-        rows: of `head_rows`.
+        rows: result of `head_rows`.
     """
     outputs = {}
     for name in (column for head in HEADS.values() for column in head.column_names):

@@ -117,12 +117,12 @@ def load_part(
     Args:
         folder: published study.
         config: configuration of the comparison.
-        splits: by fold, role of every sample.
+        splits: role of every sample, by fold.
         predictions: rows of this comparison.
-        runs: its runs.
+        runs: runs of this comparison.
 
     Raises:
-        RunError: the parts do not fit.
+        RunError: the arguments do not fit each other.
     """
     try:
         checked = ComparisonConfig.model_validate(config)

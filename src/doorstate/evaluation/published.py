@@ -30,8 +30,8 @@ def save_results(results: Results, folder: Path) -> None:
     """Write results in their published form.
 
     Args:
-        results: of one comparison.
-        folder: made if absent.
+        results: results of one comparison.
+        folder: folder to write, made if absent.
     """
     document = results.config.model_dump(mode="json")
     write_text(folder / EXPERIMENT, json.dumps(document, indent=1) + "\n")
@@ -54,9 +54,8 @@ def read_predictions(path: Path) -> pd.DataFrame:
     """
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter(
-                "error", pd.errors.ParserWarning
-            )  # lines longer than the header are cut off
+            # pandas only warns where it cuts off a line that is longer than the header.
+            warnings.simplefilter("error", pd.errors.ParserWarning)
             frame = pd.read_csv(
                 path,
                 dtype={**dict.fromkeys(TEXT_COLUMNS, "str"), "fold": "int64"},
@@ -96,7 +95,7 @@ def decode_runs(runs: Iterable[Mapping[str, Any]]) -> list[RunRecord]:
     """Return records of runs from what `encode_runs` wrote.
 
     Raises:
-        KeyError, TypeError, ValueError: it is something else.
+        KeyError, TypeError, ValueError: `runs` is something else.
     """
     return [
         RunRecord(

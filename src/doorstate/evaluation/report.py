@@ -39,16 +39,16 @@ def write_report(
 
     Args:
         folders: comparisons, finished or partly finished; several on the same samples are shown as one.
-        out: made if absent.
+        out: folder of the report, made if absent.
         dataset: data set folder, if it was moved.
         folds: number of first folds to show; all if not given.
 
     Returns:
-        The page.
+        Path of the page.
 
     Raises:
         RunError: the comparison cannot be used.
-        DatasetError: its data set or splits cannot be used.
+        DatasetError: the data set or the splits cannot be used.
     """
     results = join_results([load_results(folder, dataset, folds) for folder in folders])
     return write_results_report(results, out)
@@ -70,7 +70,7 @@ def write_dataset_report(dataset: Path, out: Path) -> Path:
 
     Args:
         dataset: prepared data set.
-        out: made if absent; gets `tables/` and `figures/`.
+        out: folder for `tables/` and `figures/`, made if absent.
 
     Returns:
         `out`.

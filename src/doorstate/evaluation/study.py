@@ -67,11 +67,11 @@ def save_study_results(study: StudyResults, folder: Path) -> None:
     """Write a study in its published form.
 
     Args:
-        study: whose comparisons of one data set have the same splits.
-        folder: made if absent.
+        study: results in which all comparisons of one data set have the same splits.
+        folder: folder to write, made if absent.
 
     Raises:
-        RunError: two comparisons of one data set have other splits.
+        RunError: two comparisons of one data set have different splits.
     """
     document = {
         "parts": {name: results.config.model_dump(mode="json") for name, results in study.parts.items()},

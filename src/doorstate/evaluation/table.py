@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tables: numbers of a frame formatted column by column, last of all, and written as Markdown, LaTeX or CSV."""
+"""Tables: the numbers of a pandas frame, formatted column by column and written as Markdown, LaTeX or CSV."""
 
 from __future__ import annotations
 
@@ -42,10 +42,10 @@ class Table:
         """Format a frame.
 
         Args:
-            title: of the table.
-            frame: numbers and labels, a row each.
-            columns: those to show, labels first.
-            note: to be read below the table.
+            title: title of the table.
+            frame: numbers and labels; one row for each row of the table.
+            columns: columns to show, labels first.
+            note: text below the table.
         """
         cells: list[list[str]] = []
         shades: list[list[float | None]] = []

@@ -21,9 +21,9 @@ def score_transfer(study: StudyResults, trained: Sequence[str], tested: Sequence
     """Score every pair of a study that is finished.
 
     Args:
-        study: has parts `<trained>/<tested>`.
-        trained: names, in the order of rows.
-        tested: names, in the order of columns.
+        study: results with parts `<trained>/<tested>`.
+        trained: names of trainings, in the order of rows.
+        tested: names of tested data sets, in the order of columns.
 
     Returns:
         Columns method, trained, tested (ordered categories), samples (with a door), f1 (macro).

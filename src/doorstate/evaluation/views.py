@@ -73,7 +73,7 @@ def outside_legend(
     """Add a legend outside the axes, in as many columns as the figure has room for.
 
     Args:
-        figure: with constrained layout.
+        figure: figure with constrained layout.
         handles: artists, one for each label.
         labels: texts in the default font size.
         place: location of the legend in matplotlib.

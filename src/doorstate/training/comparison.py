@@ -58,9 +58,9 @@ def compare(
     Finished runs are kept and unfinished ones continued.
 
     Args:
-        experiment: what to run.
-        folder: of the comparison: `comparison.json`, `splits.csv`, `runs/<method>/fold<k>/`.
-        jobs: runs at the same time, which share the processors equally.
+        experiment: experiment to run.
+        folder: folder of the comparison: `comparison.json`, `splits.csv`, `runs/<method>/fold<k>/`.
+        jobs: number of runs at the same time, which share the processors equally.
         progress: called with the numbers of finished runs and of all runs.
 
     Returns:
@@ -134,11 +134,11 @@ def train_fold(
     """Train one network of an experiment on one fold.
 
     Args:
-        experiment: its configuration.
-        folder: of the run.
-        dataset: of the experiment.
-        network: its name.
-        fold: counted from 0.
+        experiment: configuration of the experiment.
+        folder: folder of the run.
+        dataset: data set of the experiment.
+        network: name of the network.
+        fold: number of the fold, from 0.
         splits_path: `splits.csv` of the comparison.
 
     Returns:

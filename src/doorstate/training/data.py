@@ -36,10 +36,10 @@ class RunData:
         """Sort the samples.
 
         Args:
-            dataset: of the fold.
+            dataset: data set of the fold.
             roles: {sample_id: role}.
-            heads: whose targets the loaders give.
-            extra_datasets: all of their samples are trained on.
+            heads: names of heads; the loaders return their targets.
+            extra_datasets: data sets of which all samples are trained on.
 
         Raises:
             DatasetError: a role has too few samples, or none with a door.
@@ -70,9 +70,9 @@ class RunData:
         """Return the loaders of an epoch.
 
         Args:
-            num_points: of each cloud.
-            find_neighbours: the network's search, done once per validation cloud.
-            keep_train_neighbours: do it once per training cloud too.
+            num_points: points of each cloud.
+            find_neighbours: search of the network, done once per validation cloud.
+            keep_train_neighbours: search only once per training cloud too.
         """
         train = CloudLoader(
             self.dataset,

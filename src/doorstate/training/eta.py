@@ -19,8 +19,8 @@ def eta_seconds(runs: Sequence[RunSpec], recipes: Mapping[str, Recipe], num_poin
 
     Args:
         runs: all runs of the comparison.
-        recipes: by network; runs of rules take seconds and are not counted.
-        num_points: of each cloud in the last epochs.
+        recipes: recipes by network; runs of rules take seconds and are not counted.
+        num_points: points of each cloud in the last epochs.
     """
     durations = _durations_by_method(runs)
     if not durations:

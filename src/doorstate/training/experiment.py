@@ -35,9 +35,8 @@ class Experiment(FrozenModel):
     seed: int = 0
     recipe: str = "common"
     recipe_changes: dict[str, Any] = Field(default_factory=dict)  # fields of the recipe
-    network_changes: dict[str, dict[str, Any]] = Field(
-        default_factory=dict
-    )  # by network, over recipe_changes
+    # By network; these win over `recipe_changes`.
+    network_changes: dict[str, dict[str, Any]] = Field(default_factory=dict)
     # Folder of a comparison: runs start from its weights of the same network and fold. Networks that it does not have
     # start from random weights.
     start_from: str | None = None

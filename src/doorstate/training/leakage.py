@@ -49,8 +49,8 @@ def check_start_from(
     """Check the comparison whose weights an experiment starts from.
 
     Args:
-        experiment: what is to be run.
-        splits: its roles by fold.
+        experiment: experiment to run.
+        splits: roles of its samples, by fold.
         start_from: folder of the earlier comparison.
         start_settings: configuration of the earlier comparison.
 

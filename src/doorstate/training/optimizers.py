@@ -12,9 +12,8 @@ from torch.optim import SGD, Adam, AdamW, Optimizer
 from doorstate.errors import ConfigError
 from doorstate.training.recipes import Recipe
 
-_MIN_CHANNELS = (
-    16  # of a matrix for Muon: layers from coordinates or to few outputs are not worth orthogonalising
-)
+# Muon takes matrices of at least this size: layers from coordinates or to few outputs gain nothing by orthogonalising.
+_MIN_CHANNELS = 16
 
 
 def create_optimizers(recipe: Recipe, network: nn.Module) -> list[Optimizer]:

@@ -48,9 +48,8 @@ class Recipe(FrozenModel):
     batchnorm_momentum: tuple[float, float] | None = None  # first and last; halved after each step
     augmentation: Augmentation = Augmentation()
     coarse_to_fine: tuple[CoarseStage, ...] = ()  # the last epochs use all points and centres
-    part_points: int | None = Field(
-        default=None, ge=1
-    )  # points of each cloud in the loss of the parts; None: all
+    # Points of each cloud in the loss of the parts; None: all.
+    part_points: int | None = Field(default=None, ge=1)
     loss_weights: dict[str, NonNegativeFloat] = Field(default_factory=dict)  # by head or "state"; default 1
     precision: Literal["auto", "fp32", "bf16"] = "auto"
     compile: bool = False  # torch.compile; docs/speed.md has its effect
@@ -184,8 +183,8 @@ def find_recipe(name: str, network: str) -> Recipe:
     """Return the recipe of a network.
 
     Args:
-        name: "common" or "authors".
-        network: its name; "common" has defaults for networks without settings of their own.
+        name: name of the recipe, "common" or "authors".
+        network: name of the network; "common" has defaults for networks without settings of their own.
 
     Raises:
         ConfigError: there is no such recipe.

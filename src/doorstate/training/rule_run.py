@@ -46,10 +46,10 @@ def run_rule(
     Detections in the samples that the rule got wrong are kept in `detections.jsonl`, for the report.
 
     Args:
-        config: the run.
-        dataset: its data set.
+        config: configuration of the run.
+        dataset: data set of the run.
         roles: {sample_id: role} of the fold.
-        folder: of the run.
+        folder: folder of the run.
 
     Returns:
         Metrics as in `metrics.json`.

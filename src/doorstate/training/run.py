@@ -41,12 +41,12 @@ def train_run(
     """Train, choose the epoch on the validation samples, and evaluate the test samples once.
 
     Args:
-        config: the run.
-        dataset: its data set.
+        config: configuration of the run.
+        dataset: data set of the run.
         roles: {sample_id: role} of the fold. Without validation and test samples the last epoch is kept and nothing is
             tested, which makes weights for use.
-        folder: of the run; a finished run is returned, an unfinished one continued.
-        extra_datasets: those of `config.extra_train_datasets`.
+        folder: folder of the run; a finished run is returned, an unfinished one continued.
+        extra_datasets: opened data sets of `config.extra_train_datasets`.
 
     Returns:
         Metrics as in `metrics.json`.

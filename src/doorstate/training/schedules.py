@@ -32,9 +32,9 @@ class RateSchedule:
         """Set the rate of iteration 0.
 
         Args:
-            recipe: with one epoch or more.
-            optimizers: created with the recipe's learning rate.
-            iterations_per_epoch: the same in every epoch.
+            recipe: recipe with at least one epoch.
+            optimizers: optimizers that were created with the recipe's learning rate.
+            iterations_per_epoch: number of iterations in every epoch.
             num_points: points of each cloud in the last epoch.
         """
         self.iteration = 0

@@ -51,7 +51,7 @@ class Trainer:
         """Prepare the training.
 
         Args:
-            config: with one epoch or more.
+            config: configuration of a run with at least one epoch.
             fabric: device and precision.
             network: initial weights.
             data: samples.

@@ -36,7 +36,7 @@ def critical_points(network: PointNetwork, points: Points) -> NDArray[np.float32
     DGCNN's edge convolutions and the mean half of its feature are not followed: its points stand for their neighbours.
 
     Args:
-        network: in evaluation mode.
+        network: network in evaluation mode.
         points: (N, 3) metres in farthest-point order.
 
     Returns:
