@@ -24,6 +24,7 @@ from doorstate.simulation.camera import CameraPose
 from doorstate.simulation.render import render
 from doorstate.simulation.scene import Door, Opening, Scene, scene_boxes
 from doorstate.types import Part
+from tests.error_fields import about
 
 Run = Callable[..., tuple[int, str, str]]
 STEP_M = 0.0625
@@ -133,12 +134,12 @@ def test_grey_images_stored_as_colour_are_read_and_colour_images_refused(tmp_pat
         read_deepdoors2(grey, ReadOptions()), read_deepdoors2(as_colour, ReadOptions())
     )
     Image.new("RGB", (480, 640), (1, 2, 3)).save(tmp_path / "photo.png")
-    with pytest.raises(CloudReadError, match=r"photo\.png: is a colour image"):
+    with pytest.raises(CloudReadError, check=about(tmp_path / "photo.png")):
         read_deepdoors2(tmp_path / "photo.png", ReadOptions())
     Image.fromarray(np.ones((640, 480), np.uint16)).save(tmp_path / "deep.png")
-    with pytest.raises(CloudReadError, match=r"16 bit; .* 8 bit"):
+    with pytest.raises(CloudReadError, check=about(tmp_path / "deep.png")):
         read_deepdoors2(tmp_path / "deep.png", ReadOptions())
-    with pytest.raises(CloudReadError, match=r"none\.png: cannot be read"):
+    with pytest.raises(CloudReadError, check=about(tmp_path / "none.png")):
         read_deepdoors2(tmp_path / "none.png", ReadOptions())
 
 
@@ -170,7 +171,7 @@ def test_cropped_images_of_the_predecessor_are_skipped(tmp_path: Path) -> None:
 def test_other_folders_are_refused(root: Path, tmp_path: Path) -> None:
     with pytest.raises(DatasetError, match="no depth images"):
         deepdoors2_rows(root / "Door Classification" / "RGB")
-    with pytest.raises(DatasetError, match="is not a folder"):
+    with pytest.raises(DatasetError, check=about(tmp_path / "nowhere")):
         deepdoors2_rows(tmp_path / "nowhere")
     with pytest.raises(ConfigError, match="kitti") as refused:
         find_layout("kitti")

@@ -13,6 +13,7 @@ from doorstate.dataset.join import join_datasets
 from doorstate.dataset.store import CLOUDS_FILE, DESCRIPTION_FILE, PARTS_FILE, PreparedDataset, open_dataset
 from doorstate.errors import ConfigError, DatasetError
 from doorstate.simulation.manifest import MANIFEST_FILE
+from tests.error_fields import about
 
 
 def test_a_joined_data_set_has_all_clouds_and_parts(scene_dataset: PreparedDataset) -> None:
@@ -69,7 +70,7 @@ def test_a_killed_join_is_repeated(scene_dataset: PreparedDataset, tmp_path: Pat
     assert len(join_datasets(parts, folder)) == len(whole)
     (folder / DESCRIPTION_FILE).rename(tmp_path / DESCRIPTION_FILE)
     (folder / "notes.txt").touch()
-    with pytest.raises(ConfigError, match="not empty"):
+    with pytest.raises(ConfigError, check=about(folder)):
         join_datasets(parts, folder)
 
 
@@ -99,5 +100,5 @@ def test_incompatible_sources_are_refused(
     open_dataset(varied).description.model_copy(update={"thin": True, "samples": 12}).save(tmp_path / "thin")
     with pytest.raises(ConfigError, match="thin"):
         join_datasets([varied, tmp_path / "thin"], tmp_path / "b")
-    with pytest.raises(ConfigError, match="not empty"):
+    with pytest.raises(ConfigError, check=about(varied)):
         join_datasets([varied], varied)

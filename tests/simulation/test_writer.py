@@ -23,6 +23,7 @@ from doorstate.simulation.presets import PRESETS
 from doorstate.simulation.settings import RAW_KINDS, SimulationSettings
 from doorstate.simulation.writer import is_simulated, read_settings, simulate_dataset
 from doorstate.types import STATES
+from tests.error_fields import about
 
 SCRIPT = """
 import sys
@@ -131,12 +132,12 @@ def test_a_killed_simulation_continues_and_leaves_no_worker(tmp_path: Path) -> N
 def test_a_folder_with_other_contents_is_refused(tmp_path: Path) -> None:
     simulate_dataset(tmp_path / "data", settings_of(1), 1)
     for changed in (settings_of(2), settings_of(1, seed=5), settings_of(1, width=81)):
-        with pytest.raises(ConfigError, match="other settings"):
+        with pytest.raises(ConfigError, check=about(tmp_path / "data")):
             simulate_dataset(tmp_path / "data", changed, 1)
-    with pytest.raises(ConfigError, match="something else"):
+    with pytest.raises(ConfigError, check=about(tmp_path)):
         simulate_dataset(tmp_path, settings_of(1), 1)
     (tmp_path / "file").touch()
-    with pytest.raises(ConfigError, match="something else"):
+    with pytest.raises(ConfigError, check=about(tmp_path / "file")):
         simulate_dataset(tmp_path / "file", settings_of(1), 1)
     (tmp_path / "empty").mkdir()
     assert len(simulate_dataset(tmp_path / "empty", settings_of(1), 1)) == 3
