@@ -61,12 +61,12 @@ def wrong_pictures() -> Iterator[str]:
         path.read_text(encoding="utf-8")
         for path in (*paths.DOCS.rglob("*.md"), paths.REPOSITORY / "README.md")
     )
-    shown = set(re.findall(r"images/([\w-]+\.png)", text))
+    used = set(re.findall(r"images/([\w-]+\.png)", text))
     tracked = {path.name: path for path in (paths.DOCS / "images").iterdir()}
-    for name in sorted(shown | set(tracked)):
+    for name in sorted(used | set(tracked)):
         if name not in tracked:
             yield f"docs/images/{name}: is missing"
-        elif name not in shown:
+        elif name not in used:
             yield f"docs/images/{name}: is shown on no page"
         elif tracked[name].stat().st_size > LARGEST_PICTURE:
             yield f"docs/images/{name}: is larger than {LARGEST_PICTURE} bytes"

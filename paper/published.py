@@ -11,7 +11,7 @@ from doorstate.evaluation.study import StudyResults, load_study_results
 
 from . import paths
 
-JOINED = {"related": "paper"}
+BESIDE = {"related": "paper"}
 """Comparisons that are shown beside the methods of another one."""
 
 
@@ -22,9 +22,9 @@ def comparison(name: str) -> Results:
 
 
 @cache
-def joined(name: str) -> Results:
+def side_by_side(name: str) -> Results:
     """Return a published comparison with the one that it is shown beside, if any."""
-    first = JOINED.get(name)
+    first = BESIDE.get(name)
     return join_results([comparison(first), comparison(name)]) if first else comparison(name)
 
 

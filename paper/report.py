@@ -11,7 +11,7 @@ from doorstate.evaluation.transfer import score_transfer, write_transfer
 
 from . import paths
 from .definition import read_definition
-from .published import joined, study
+from .published import side_by_side, study
 
 
 def write_published_report(name: str, out: Path | None = None) -> Path:
@@ -30,4 +30,4 @@ def write_published_report(name: str, out: Path | None = None) -> Path:
     if definition.command == "transfer":
         trained, tested = (list(definition.content[key]) for key in ("trained", "tested"))
         return write_transfer(score_transfer(study(name), trained, tested), folder)
-    return write_results_report(joined(name), folder)
+    return write_results_report(side_by_side(name), folder)

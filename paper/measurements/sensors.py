@@ -178,8 +178,8 @@ def _hidden(seeds: _Seeds) -> Iterator[SensorResult]:
             pairs = [(near_m * (1 + near), 3.0 * (1 + far)) for near in spread for far in spread]
             lost = [_shadow_px(model, *pair, upright=name == "deepdoors2") for pair in pairs]
             published = np.mean([focal_px * baseline_m * (1 / near - 1 / far) for near, far in pairs])
-            at = f"edge about {near_m:g} m, wall about 3 m"
-            yield SensorResult(name, "shadow", at, "px", float(published), float(np.mean(lost)))
+            condition = f"edge about {near_m:g} m, wall about 3 m"
+            yield SensorResult(name, "shadow", condition, "px", float(published), float(np.mean(lost)))
     for name in ("d435", "deepdoors2"):
         model = SENSORS[name]
         focal_px, baseline_m, _ = _GEOMETRY[name]
@@ -236,10 +236,10 @@ def _lost(seeds: _Seeds) -> Iterator[SensorResult]:
     pinhole = cropped(model, 320, 240)
     for material, published in (("glass", 0.7), ("dark", 0.3)):
         boxes = _split(material)  # type: ignore[arg-type]
-        there = is_made_of(material, render(boxes, AHEAD, pinhole), boxes)  # type: ignore[arg-type]
+        is_material = is_made_of(material, render(boxes, AHEAD, pinhole), boxes)  # type: ignore[arg-type]
         lost = np.isnan(
             measure_depth(with_stages(model, "materials"), boxes, pinhole, range(5 * len(seeds)))
-        )[:, there]
+        )[:, is_material]
         yield SensorResult("xtion", f"lost on {material}", "2 m", "share", published, lost.mean())
     boxes = [wall(2.0, 0.0, "gloss")]
     lost = np.isnan(measure_depth(with_stages(model, "materials"), boxes, pinhole, seeds[:1])[0])

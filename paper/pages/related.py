@@ -16,14 +16,14 @@ from doorstate.evaluation.table import Table, count_column, interval_column, num
 from doorstate.types import ABSTAINED
 
 from ..paths import TITLES
-from ..published import comparison, joined
+from ..published import comparison, side_by_side
 from .cases import PAPER_CASES, accuracy_by_case, compare_with_rule
 from .results import case_columns, method_column
 
 
 def content() -> Mapping[str, Any]:
     """Return the values of the page."""
-    results, by_pose = joined("related"), comparison("by-pose")
+    results, by_pose = side_by_side("related"), comparison("by-pose")
     summary = related_summary(results, by_pose)
     rules = [name for name in results.rules if (results.tested_by(name)["predicted"] == "semi_open").any()]
     by_name = summary.set_index("method")

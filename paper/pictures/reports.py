@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from doorstate.evaluation.comparison import Results
 from doorstate.evaluation.figures.encode import encode_figures
 
-from ..published import joined
+from ..published import side_by_side
 
 
 def draw(experiment: str, name: str, draw_figure: Callable[[Results], Figure | None]) -> bytes:
@@ -21,4 +21,4 @@ def draw(experiment: str, name: str, draw_figure: Callable[[Results], Figure | N
         name: file of the figure in the report, without its suffix.
         draw_figure: function that draws it.
     """
-    return encode_figures({name: draw_figure(joined(experiment))})[name]
+    return encode_figures({name: draw_figure(side_by_side(experiment))})[name]

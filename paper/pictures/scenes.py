@@ -28,8 +28,8 @@ def picture(row: Row, frame: Frame) -> Image.Image:
     """Return a shaded sample with tinted glass."""
     intrinsics, boxes = row.camera.intrinsics(), row.boxes()
     shaded = shade(frame.full, intrinsics).astype(np.float64)
-    seen = render(boxes, row.camera_pose(), intrinsics)
-    glass = is_made_of("glass", seen, boxes)
+    rendered = render(boxes, row.camera_pose(), intrinsics)
+    glass = is_made_of("glass", rendered, boxes)
     shaded[glass] = 0.6 * shaded[glass] + 0.4 * GLASS
     return Image.fromarray(shaded.astype(np.uint8)).resize((WIDTH, HEIGHT), Image.Resampling.LANCZOS)
 

@@ -31,8 +31,8 @@ NO_DEPTH = "#f4a6c0"
 def measured(sensor: str, opened: bool, pose: CameraPose) -> DepthImage:
     """Return the depth of the door measured by a sensor."""
     model, boxes = SENSORS[sensor], HALF_OPEN if opened else CLOSED
-    seen = render_behind_glass(boxes, pose, model.camera.intrinsics())
-    return sense(model, seen, boxes, pose, model.camera, 1).depth_m
+    rendered = render_behind_glass(boxes, pose, model.camera.intrinsics())
+    return sense(model, rendered, boxes, pose, model.camera, 1).depth_m
 
 
 def section(sensor: str, distance_m: float) -> tuple[NDArray[np.float32], NDArray[np.float32]]:

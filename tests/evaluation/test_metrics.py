@@ -13,7 +13,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sklearn.metrics import f1_score, precision_recall_fscore_support
 
-from doorstate.evaluation.metrics import accuracy, confusion, macro_f1, mean_and_deviation, ratio, scores
+from doorstate.evaluation.metrics import (
+    accuracy,
+    confusion,
+    macro_f1,
+    mean_and_deviation,
+    precision_recall_f1,
+    ratio,
+)
 from doorstate.types import NO_DOOR, PREDICTED_LABELS, STATES
 
 labels = st.lists(
@@ -40,7 +47,7 @@ def test_samples_without_a_door_are_not_counted() -> None:
 def test_no_samples_give_an_empty_confusion_and_undefined_scores() -> None:
     counts = confusion(frame_of([]))
     assert counts.tolist() == [[0] * 4] * 3
-    assert np.isnan(scores(counts).f1).all()
+    assert np.isnan(precision_recall_f1(counts).f1).all()
     assert math.isnan(accuracy(counts))
 
 
@@ -58,7 +65,7 @@ def test_confusion_sums(pairs: list[tuple[str, str]]) -> None:
 @settings(deadline=None, max_examples=40)
 @given(labels)
 def test_scores_equal_scikit_learn(pairs: list[tuple[str, str]]) -> None:
-    score = scores(confusion(frame_of(pairs)))
+    score = precision_recall_f1(confusion(frame_of(pairs)))
     true, predicted = zip(*pairs, strict=True)
     expected = precision_recall_fscore_support(true, predicted, labels=STATES, zero_division=np.nan)
     np.testing.assert_allclose(score.precision, expected[0])
@@ -75,12 +82,12 @@ def test_macro_f1_equals_scikit_learn() -> None:
 
 def test_precision_and_recall_are_not_swapped() -> None:
     # One of four closed doors is recognised (recall 1/4); everything predicted closed is closed (precision 1).
-    score = scores(np.array([[1, 3, 0], [0, 5, 0], [0, 0, 5]]))
+    score = precision_recall_f1(np.array([[1, 3, 0], [0, 5, 0], [0, 0, 5]]))
     assert (score.recall[0], score.precision[0]) == (0.25, 1.0)
 
 
 def test_undefined_is_nan_and_makes_the_mean_undefined() -> None:
-    score = scores(np.array([[4, 0, 0], [0, 0, 0], [0, 0, 2]]))
+    score = precision_recall_f1(np.array([[4, 0, 0], [0, 0, 0], [0, 0, 2]]))
     assert np.isnan([score.precision[1], score.recall[1], score.f1[1]]).all()
     assert np.isnan(float(score.macro.f1))
     assert ratio([1, 0], [2, 0]).tolist()[0] == 0.5

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 from paper.check import check, wrong_metrics
-from paper.published import comparison, joined
+from paper.published import comparison, side_by_side
 
 from doorstate.evaluation.method_scores import summarize_methods
 
@@ -58,7 +58,7 @@ def test_headline_scores(name: str) -> None:
 
 
 def test_rules_are_shown_beside_the_networks_of_the_paper() -> None:
-    assert joined("related").methods == (*HEADLINES["paper"], *HEADLINES["related"])
+    assert side_by_side("related").methods == (*HEADLINES["paper"], *HEADLINES["related"])
 
 
 @pytest.mark.slow

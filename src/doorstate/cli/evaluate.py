@@ -55,7 +55,7 @@ def evaluate(
     out: Annotated[
         Path | None, typer.Option(help="Folder for predictions.csv, metrics.json, tables/ and frames.html.")
     ] = None,
-    everything: Annotated[
+    all_frames: Annotated[
         bool, typer.Option("--all", help="Show all frames in frames.html, not only errors.")
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the metrics as one JSON object.")] = False,
@@ -80,12 +80,12 @@ def evaluate(
     """
     from doorstate._files import check_writable
     from doorstate.cli.console import progress_bar, stderr
-    from doorstate.cli.evaluate_output import PAGE, print_scores, write_report
+    from doorstate.cli.evaluate_output import PAGE, print_scores, write_frame_report
     from doorstate.dataset.labelled import check_column, labelled_frames
     from doorstate.evaluation.frame_tables import NO_GROUP, frame_notes, frame_tables
     from doorstate.evaluation.frames import evaluate_frames
 
-    if everything and out is None:
+    if all_frames and out is None:
         raise ConfigError("--all needs --out")
     check_layout(layout, options)
     frames = labelled_frames(folder, options, layout)
@@ -109,7 +109,7 @@ def evaluate(
     else:
         print_scores(tables, notes)
     if out is not None:
-        page = write_report(out, folder, predictors, results, scores, tables, notes, everything)
+        page = write_frame_report(out, folder, predictors, results, scores, tables, notes, all_frames)
         stderr.print(f"page: {page}", soft_wrap=True)
     if results.unreadable:
         stderr.print(

@@ -32,7 +32,7 @@ def print_scores(tables: Mapping[str, Table], notes: Sequence[str]) -> None:
             stdout.print(table.note, soft_wrap=True)
 
 
-def write_report(
+def write_frame_report(
     out: Path,
     folder: Path,
     predictors: Predictors,
@@ -40,7 +40,7 @@ def write_report(
     scores: FrameScores,
     tables: Mapping[str, Table],
     notes: Sequence[str],
-    everything: bool,
+    all_frames: bool,
 ) -> Path:
     """Write predictions, metrics, tables and the page into a folder, and return the path of the page.
 
@@ -52,7 +52,7 @@ def write_report(
         scores: scores of the predictions.
         tables: tables of the scores.
         notes: notes to read before the numbers.
-        everything: show all frames on the page, not only errors.
+        all_frames: show all frames on the page, not only errors.
     """
     name = folder.resolve().name
     table = results.joined.drop(columns="correct").rename(columns={"sample_id": "file"})
@@ -66,7 +66,7 @@ def write_report(
     write_text(out / "metrics.json", json.dumps(metrics, indent=2) + "\n")
     save_tables(tables, out / "tables")
     with progress_bar("Writing the page") as progress:
-        cards = make_cards(results, predictors, choose_frames(results, everything), progress)
+        cards = make_cards(results, predictors, choose_frames(results, all_frames), progress)
     page = out / PAGE
     write_text(page, render_frame_page(name, tables, results, cards, notes))
     return page

@@ -73,9 +73,9 @@ def _check_labels(run: pd.DataFrame, path: Path) -> None:
 
 
 def _check_roles(run: pd.DataFrame, roles: Mapping[str, Role], fold: int, path: Path) -> None:
-    other = run[run["sample_id"].map(pd.Series(roles, dtype="str")) != run["role"]]
-    if len(other):
-        row = other.iloc[0]
+    wrong = run[run["sample_id"].map(pd.Series(roles, dtype="str")) != run["role"]]
+    if len(wrong):
+        row = wrong.iloc[0]
         raise RunError(
             f"sample {row['sample_id']} is not a {row['role']} sample of fold {fold} in the splits",
             path=path,
@@ -86,9 +86,9 @@ def _check_roles(run: pd.DataFrame, roles: Mapping[str, Role], fold: int, path: 
 def _check_states(run: pd.DataFrame, states: pd.Series[str], path: Path) -> None:
     # A published manifest holds the tested samples only.
     expected = run["sample_id"].map(states)
-    other = run[(expected != run["state"]) & ((run["role"] == "test") | expected.notna())]
-    if len(other):
-        row = other.iloc[0]
+    wrong = run[(expected != run["state"]) & ((run["role"] == "test") | expected.notna())]
+    if len(wrong):
+        row = wrong.iloc[0]
         raise RunError(
             f"sample {row['sample_id']} is {row['state']} here and {states.get(row['sample_id'], 'absent')} in the "
             "manifest of the data set",

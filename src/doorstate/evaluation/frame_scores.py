@@ -63,17 +63,19 @@ def score_frames(
     is_door = predictions["state"].isin(STATES)
     doors = predictions.assign(group=groups)[is_door]
     methods = predictions["method"].drop_duplicates().tolist()
-    one = doors[doors["method"] == methods[0]] if methods else doors
-    counts = one["state"].value_counts().reindex(list(STATES), fill_value=0)
+    of_first = doors[doors["method"] == methods[0]] if methods else doors
+    counts = of_first["state"].value_counts().reindex(list(STATES), fill_value=0)
     constant = str(counts.idxmax())
-    always = one.assign(method=f"always {constant}", predicted=constant, correct=(one["state"] == constant))
+    always = of_first.assign(
+        method=f"always {constant}", predicted=constant, correct=(of_first["state"] == constant)
+    )
     scores = [
         {"method": str(method), **_score(rows)}
         for method, rows in pd.concat([doors, always]).groupby("method", sort=False)
     ]
     return FrameScores(
-        len(one),
-        one["group"].nunique(),
+        len(of_first),
+        of_first["group"].nunique(),
         {str(state): int(count) for state, count in counts.items()},
         constant,
         pd.DataFrame(scores),

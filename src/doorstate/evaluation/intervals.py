@@ -12,7 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from statsmodels.stats.proportion import proportion_confint
 
-from doorstate.evaluation.metrics import Floats, confusion_cells, scores
+from doorstate.evaluation.metrics import Floats, confusion_cells, precision_recall_f1
 from doorstate.types import PREDICTED_LABELS, STATES
 
 Interval = tuple[float, float]
@@ -87,7 +87,7 @@ def bootstrap_f1(
     np.add.at(cells, (cluster, confusion_cells(predictions)), 1)
     patterns, counts = np.unique(cells, axis=0, return_counts=True)
     draws = generator.multinomial(len(cells), counts / len(cells), size=resamples)
-    resampled = scores((draws @ patterns).reshape(resamples, states, labels))  # (R, 3, 4)
+    resampled = precision_recall_f1((draws @ patterns).reshape(resamples, states, labels))  # (R, 3, 4)
     return F1Intervals(
         tuple(_percentile_interval(values) for values in resampled.f1.T),
         _percentile_interval(resampled.macro.f1),

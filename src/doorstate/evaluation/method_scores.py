@@ -11,7 +11,14 @@ import pandas as pd
 from doorstate.evaluation.comparison import Results
 from doorstate.evaluation.intervals import F1Intervals, Interval, bootstrap_f1, bounds, wilson_interval
 from doorstate.evaluation.manifest import text_values
-from doorstate.evaluation.metrics import Floats, confusion, macro_f1, mean_and_deviation, ratio, scores
+from doorstate.evaluation.metrics import (
+    Floats,
+    confusion,
+    macro_f1,
+    mean_and_deviation,
+    precision_recall_f1,
+    ratio,
+)
 from doorstate.types import ABSTAINED, PREDICTED_LABELS, STATES
 
 MACRO = "macro"
@@ -87,10 +94,10 @@ def score_states(results: Results) -> pd.DataFrame:
     for method in results.methods:
         tested = results.tested_by(method)
         counts, intervals = confusion(tested), f1_intervals(results, method)
-        by_fold = scores(
+        by_fold = precision_recall_f1(
             np.stack([confusion(tested[tested["fold"] == run.fold]) for run in results.runs_of(method)])
         )
-        score, hits = scores(counts), np.diagonal(counts)
+        score, hits = precision_recall_f1(counts), np.diagonal(counts)
         for index, state in enumerate(STATES):
             predicted_samples, state_samples = counts[:, index].sum(), counts[index].sum()
             rows.append(

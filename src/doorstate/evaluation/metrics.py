@@ -67,7 +67,7 @@ class Scores:
         return Scores(*(np.asarray(values.mean(axis=-1)) for values in ratios))
 
 
-def scores(counts: NDArray[Any]) -> Scores:
+def precision_recall_f1(counts: NDArray[Any]) -> Scores:
     """Compute precision, recall and F1 of each state; an abstention is a miss, and no false alarm.
 
     recall = TP / (TP + FN), precision = TP / (TP + FP), F1 = 2 TP / (2 TP + FP + FN): the standard
@@ -89,7 +89,7 @@ def scores(counts: NDArray[Any]) -> Scores:
 
 def macro_f1(predictions: pd.DataFrame) -> float:
     """Return the macro F1 of predictions."""
-    return float(scores(confusion(predictions)).macro.f1)
+    return float(precision_recall_f1(confusion(predictions)).macro.f1)
 
 
 def accuracy(counts: NDArray[Any]) -> float:

@@ -85,10 +85,10 @@ def _load_runs(
         raise RunError("no run has predictions yet", path=folder, hint="train at least one network first")
     settings: dict[str, Mapping[str, Any]] = {}
     detections: dict[str, dict[str, tuple[Detection, ...]]] = {}
-    for each in contents:
-        settings.setdefault(each.record.method, each.config)
-        detections.setdefault(each.record.method, {}).update(each.detections)
-    predictions = pd.concat([each.predictions for each in contents], ignore_index=True)
+    for run in contents:
+        settings.setdefault(run.record.method, run.config)
+        detections.setdefault(run.record.method, {}).update(run.detections)
+    predictions = pd.concat([run.predictions for run in contents], ignore_index=True)
     manifest = read_manifest(dataset_folder)
     # Head outputs alone name samples without a door, and no states.
     predictions["state"] = predictions["state"].fillna(predictions["sample_id"].map(manifest["state"]))
@@ -98,7 +98,7 @@ def _load_runs(
         manifest,
         splits,
         order_predictions(predictions, config),
-        tuple(each.record for each in contents),
+        tuple(run.record for run in contents),
         detections,
     )
     check_predictions(results, lambda method, fold: run_of(folder, method, fold).predictions)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from doorstate.dataset.strata import BANDS, REGIONS
 from doorstate.evaluation.comparison import Results
 from doorstate.evaluation.manifest import text_values
-from doorstate.evaluation.metrics import confusion_cells, label_codes, scores
+from doorstate.evaluation.metrics import confusion_cells, label_codes, precision_recall_f1
 from doorstate.types import NO_DOOR, PREDICTED_LABELS, STATES, Indices
 
 ALL = "all"
@@ -53,7 +53,7 @@ def score_strata(results: Results, state: str) -> pd.DataFrame:
         tested = results.tested_by(method)
         cells = _with_sums(_count(tested, confusion_cells(tested), len(STATES) * len(PREDICTED_LABELS)))
         counts = cells.reshape(-1, len(STATES), len(PREDICTED_LABELS))  # (30, 3, 4)
-        score = scores(counts)
+        score = precision_recall_f1(counts)
         columns = {
             "region": np.repeat(STRATUM_REGIONS, len(STRATUM_BANDS)),
             "band": np.tile(STRATUM_BANDS, len(STRATUM_REGIONS)),

@@ -25,7 +25,7 @@ from doorstate.training.checkpoint import TrainingState
 from doorstate.training.config import RunConfig
 from doorstate.training.data import RunData
 from doorstate.training.environment import describe_environment, has_fast_bf16
-from doorstate.training.evaluation import evaluate
+from doorstate.training.network_outputs import network_outputs
 from doorstate.training.recipes import Recipe
 from doorstate.training.run_folder import RunFolder, write_head_outputs, write_predictions
 from doorstate.training.trainer import Trainer
@@ -133,16 +133,16 @@ def evaluate_run(
         if not data.samples[role]:
             continue
         loader = data.loader(role, config.num_points)
-        result = evaluate(network, loader, fabric)
-        mask = result.has_state
+        outputs = network_outputs(network, loader, fabric)
+        mask = outputs.has_state
         samples = [name for name, has_state in zip(data.samples[role], mask, strict=True) if has_state]
-        write_predictions(path, samples, result.labels[mask], result.probabilities[mask])
-        metrics |= {f"{role}_macro_f1": result.macro_f1, f"{role}_accuracy": result.accuracy}
-        if role == "test" and result.head_values:
-            columns = head_columns(result.head_values, loader.centroids)
+        write_predictions(path, samples, outputs.labels[mask], outputs.probabilities[mask])
+        metrics |= {f"{role}_macro_f1": outputs.macro_f1, f"{role}_accuracy": outputs.accuracy}
+        if role == "test" and outputs.head_values:
+            columns = head_columns(outputs.head_values, loader.centroids)
             write_head_outputs(run.head_outputs, data.samples[role], columns)
-        if role == "test" and result.part_counts is not None:
-            metrics["test_part_counts"] = result.part_counts.tolist()
+        if role == "test" and outputs.part_counts is not None:
+            metrics["test_part_counts"] = outputs.part_counts.tolist()
     return metrics
 
 

@@ -24,7 +24,7 @@ from doorstate.training.checkpoint import Checkpoint, EpochProgress, TrainingSta
 from doorstate.training.config import RunConfig
 from doorstate.training.data import EpochLoaders, RunData
 from doorstate.training.environment import compile_if_possible
-from doorstate.training.evaluation import evaluate
+from doorstate.training.network_outputs import network_outputs
 from doorstate.training.optimizers import create_optimizers
 from doorstate.training.run_folder import RunFolder
 from doorstate.training.schedules import RateSchedule, Resolution, batchnorm_momentum, resolution_of_epoch
@@ -103,7 +103,7 @@ class Trainer:
         }
         score = (0.0, float(epoch))  # without validation samples the last epoch is the best
         if len(loaders.val):
-            validation = evaluate(self.network, loaders.val, self.fabric)
+            validation = network_outputs(self.network, loaders.val, self.fabric)
             score = (validation.macro_f1, -validation.loss)
             entry |= {"val_loss": validation.loss, "val_macro_f1": validation.macro_f1}
         # Weights are used at full resolution, so an epoch on coarser clouds is never the best.

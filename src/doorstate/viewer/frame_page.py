@@ -58,16 +58,16 @@ class FrameCard:
     misclassified_by: tuple[str, ...]
 
 
-def choose_frames(results: FrameResults, everything: bool, limit: int = MAX_CARDS) -> list[int]:
+def choose_frames(results: FrameResults, all_frames: bool, limit: int = MAX_CARDS) -> list[int]:
     """Return the numbers of the frames to show, in descending order of the number of wrong methods.
 
     Args:
         results: predictions for the frames.
-        everything: include frames that all methods got right.
+        all_frames: include frames that all methods got right.
         limit: largest number of frames.
     """
     misses = [len(results.misclassified_by(number)) for number in range(len(results.frames))]
-    candidates = [number for number, count in enumerate(misses) if everything or count]
+    candidates = [number for number, count in enumerate(misses) if all_frames or count]
     return sorted(candidates, key=lambda number: -misses[number])[:limit]
 
 

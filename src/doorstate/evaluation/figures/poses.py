@@ -33,10 +33,10 @@ _MARKERS = {"closed": "s", "semi_open": "^", "open": "o"}
 
 def poses_figure(manifest: pd.DataFrame) -> Figure | None:
     """Draw Figure 1: robot poses by region, distance rings, and the door; None for data without poses."""
-    posed = _posed(manifest)
-    if posed.empty:
+    with_pose = _with_pose(manifest)
+    if with_pose.empty:
         return None
-    poses = posed.drop_duplicates(["x_m", "y_m", "heading_deg"])
+    poses = with_pose.drop_duplicates(["x_m", "y_m", "heading_deg"])
     position = _positions(poses)
     heading_rad = np.radians(poses["heading_deg"].to_numpy(dtype=np.float64))
     figure = Figure(figsize=(9.0, 5.0), layout="constrained")
@@ -65,15 +65,15 @@ def poses_figure(manifest: pd.DataFrame) -> Figure | None:
 
 def errors_figure(results: Results) -> Figure | None:
     """Draw the poses of each method's misclassified samples; None without poses or without errors."""
-    posed, errors = _posed(results.manifest), results.errors
-    if posed.empty or errors.empty:
+    with_pose, errors = _with_pose(results.manifest), results.errors
+    if with_pose.empty or errors.empty:
         return None
     methods = results.methods
     columns = min(3, len(methods))
     lines = math.ceil(len(methods) / columns)
     figure = Figure(figsize=(4.2 * columns, 2.4 * lines + 0.4), layout="constrained")
     axes = figure.subplots(lines, columns, squeeze=False).ravel()
-    everywhere = np.unique(_positions(posed), axis=0)
+    everywhere = np.unique(_positions(with_pose), axis=0)
     undecidable = is_undecidable(errors)
     for axis, method in zip(axes, methods, strict=False):
         axis.scatter(*everywhere.T, s=2, color=_FAINT, linewidths=0, rasterized=True)
@@ -114,7 +114,7 @@ def _door_of(manifest: pd.DataFrame) -> Door:
     return (unflatten(first).scene.door if shows_one_scene else None) or Door()
 
 
-def _posed(manifest: pd.DataFrame) -> pd.DataFrame:
+def _with_pose(manifest: pd.DataFrame) -> pd.DataFrame:
     """Return the rows with a pose."""
     if not set(_POSE_COLUMNS) <= set(manifest):
         return manifest.iloc[:0]

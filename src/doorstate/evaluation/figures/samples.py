@@ -121,8 +121,8 @@ def draw_cloud(axis: Axes, dataset: PreparedDataset, index: int) -> None:
 
 def part_legend(figure: Figure, dataset: PreparedDataset, indices: Iterable[int]) -> None:
     """Add a legend of the parts in these samples' clouds below the figure; none where parts are unknown."""
-    seen = sorted({part for index in indices for part in _drawn_parts(dataset, index).tolist()})
-    if seen:
-        handles = [Line2D([], [], marker="o", linestyle="", color=PART_COLORS[Part(part)]) for part in seen]
-        names = [Part(part).name.lower() for part in seen]
+    parts = sorted({part for index in indices for part in _drawn_parts(dataset, index).tolist()})
+    if parts:
+        handles = [Line2D([], [], marker="o", linestyle="", color=PART_COLORS[Part(part)]) for part in parts]
+        names = [Part(part).name.lower() for part in parts]
         outside_legend(figure, handles, names, "outside lower center")

@@ -22,7 +22,7 @@ from doorstate.types import PARTS, STATES
 _BATCH_SIZE = 32
 
 
-class Evaluation(NamedTuple):
+class NetworkOutputs(NamedTuple):
     """Outputs of a network for M samples in order, and their labels."""
 
     loss: float  # mean cross entropy of the states
@@ -53,7 +53,9 @@ class Evaluation(NamedTuple):
 
 
 @torch.no_grad()
-def evaluate(network: PointNetwork, loader: CloudLoader, fabric: lightning_fabric.Fabric) -> Evaluation:
+def network_outputs(
+    network: PointNetwork, loader: CloudLoader, fabric: lightning_fabric.Fabric
+) -> NetworkOutputs:
     """Return the outputs of a network for all samples of a loader."""
     network.eval()
     outputs: defaultdict[str, list[Tensor]] = defaultdict(list)
@@ -73,4 +75,4 @@ def evaluate(network: PointNetwork, loader: CloudLoader, fabric: lightning_fabri
     logits, labels = joined.pop(STATE), joined.pop("labels")
     loss = functional.cross_entropy(logits, labels, ignore_index=IGNORE_INDEX).item()
     head_values = {name: values.numpy() for name, values in joined.items()}
-    return Evaluation(loss, logits.softmax(1).numpy(), labels.numpy(), head_values, part_counts)
+    return NetworkOutputs(loss, logits.softmax(1).numpy(), labels.numpy(), head_values, part_counts)
