@@ -38,9 +38,9 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     finished = subprocess.run(
         command, env=usual | {"PYTHONWARNINGS": "error"}, capture_output=True, text=True, check=False
     )
-    said = finished.stdout + finished.stderr
-    assert finished.returncode == 0, said
-    assert [line for line in said.splitlines() if "warning" in line.lower()] == []
+    output = finished.stdout + finished.stderr
+    assert finished.returncode == 0, output
+    assert [line for line in output.splitlines() if "warning" in line.lower()] == []
     return folder / "dist"
 
 
@@ -95,14 +95,14 @@ def test_the_unpacked_wheel_answers(built: Path, simulated_folder: Path, tmp_pat
         "--rule",
         "plane_state",
     )
-    said = subprocess.check_output(
+    output = subprocess.check_output(
         [sys.executable, "-c", *script],
         env=os.environ | {"PYTHONPATH": str(tmp_path)},
         cwd=tmp_path,
         text=True,
     )
-    assert said.startswith(str(tmp_path))
-    assert "│  open │" in said
+    assert output.startswith(str(tmp_path))
+    assert "│  open │" in output
 
 
 @pytest.mark.slow

@@ -162,7 +162,12 @@ def missing_extra(feature: str, *packages: str) -> MissingExtraError:
 
 
 def unknown_name(
-    kind: str, name: str, names: Iterable[str], error: type[DoorstateError] = ConfigError
+    kind: str,
+    name: str,
+    names: Iterable[str],
+    error: type[DoorstateError] = ConfigError,
+    *,
+    field: str | None = None,
 ) -> DoorstateError:
     """Return the error of a name that does not exist, with the closest name or all names.
 
@@ -171,11 +176,12 @@ def unknown_name(
         name: the unknown name.
         names: all names that exist.
         error: class of the error.
+        field: parameter that holds the name.
     """
     names = list(names)
     close = get_close_matches(name, names, n=1)
     hint = f"did you mean {close[0]!r}?" if close else f"names are {', '.join(names) or 'none'}"
-    return error(f"unknown {kind} {name!r}", hint=hint)
+    return error(f"unknown {kind} {name!r}", field=field, hint=hint)
 
 
 def first_validation_error(error: ValidationError, fields: Iterable[str] = ()) -> str:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shapes of clouds: images and stacked clouds are told apart."""
+"""Shapes of clouds: images are distinguished from stacked clouds."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ def recorded(opening_deg: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def write(path: Path, depth_m: np.ndarray, mode: str = "L") -> Path:
-    """As published: turned upright, 8 bit, 1/16 m."""
+    """Write a depth image as published: turned upright, 8 bit, in steps of 1/16 m."""
     path.parent.mkdir(parents=True, exist_ok=True)
     steps = np.nan_to_num(np.rint(depth_m / STEP_M)).astype(np.uint8)
     Image.fromarray(np.ascontiguousarray(np.rot90(steps, -1))).convert(mode).save(path)

@@ -59,7 +59,7 @@ def test_weights_trained_on_everything(folders: Path, small_dataset: PreparedDat
     assert path.name == "ogurob-pointnet.safetensors"
     assert card.temperature != 1
     assert card.max_depth_m == 5
-    assert card.points == card.num_points == 128, "no study tells that fewer are enough"
+    assert card.points_in_use == card.num_points == 128, "no study tells that fewer are enough"
     text = path.with_suffix(".md").read_text(encoding="utf-8")
     assert len(text.splitlines()) <= 60
     assert text.count("| paper | 36 |") == 2

@@ -58,7 +58,7 @@ def export(
     if weights is not None and card.network != network:
         raise ConfigError(f"the weights are of {card.network}, not of {network}", path=weights)
     with progress_bar("Simulating clouds") as progress:
-        references = reference_clouds(clouds, points or card.points, progress)
+        references = reference_clouds(clouds, points or card.points_in_use, progress)
     with progress_bar(f"Exporting {network}") as progress:
         result = export_onnx(path, loaded, card, references, opset=opset, int8=int8, progress=progress)
     stdout.print(

@@ -11,7 +11,7 @@ from pathlib import Path
 from doorstate.dataset.class_folders import file_row, label_of_folder, nearest_label
 from doorstate.dataset.frame_index import INDEX, read_index
 from doorstate.dataset.layouts import find_layout
-from doorstate.errors import ConfigError, DatasetError
+from doorstate.errors import DatasetError, unknown_name
 from doorstate.io.find import find_clouds
 from doorstate.io.options import DEFAULT_OPTIONS, ReadOptions
 from doorstate.io.readers import read_cloud
@@ -73,7 +73,7 @@ def check_column(frames: Sequence[LabelledFrame], column: str) -> None:
     """Raise ConfigError unless a frame has this column."""
     names = list(dict.fromkeys(name for frame in frames for name in frame.columns))
     if column not in names:
-        raise ConfigError(f"no column {column!r}", expected=f"one of {', '.join(names) or '(none)'}")
+        raise unknown_name("column", column, names)
 
 
 def _frame(folder: Path, row: Mapping[str, str], read: Callable[[], Points]) -> LabelledFrame:

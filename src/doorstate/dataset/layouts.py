@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from doorstate.dataset.deepdoors2 import deepdoors2_rows, read_deepdoors2
-from doorstate.errors import ConfigError
+from doorstate.errors import unknown_name
 from doorstate.io.options import ReadOptions
 from doorstate.types import Points
 
@@ -31,5 +31,5 @@ def find_layout(name: str) -> Layout:
         ConfigError: no such layout.
     """
     if name not in LAYOUTS:
-        raise ConfigError(f"no layout {name!r}", field="layout", expected=f"one of {', '.join(LAYOUTS)}")
+        raise unknown_name("layout", name, LAYOUTS, field="layout")
     return LAYOUTS[name]

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from doorstate._files import read_csv, write_csv
 from doorstate.dataset.pose_blocks import split_poses
-from doorstate.errors import ConfigError, DatasetError
+from doorstate.errors import DatasetError, unknown_name
 
 Role = Literal["train", "val", "test", "unused"]
 Strata = Sequence[tuple[str, ...]]
@@ -50,9 +50,7 @@ def draw_splits(rows: Sequence[Mapping[str, str]], protocol: str, seed: int) -> 
             f"{len(rows)} samples are too few for {NUM_FOLDS} folds", expected=f"at least {_LEAST_SAMPLES}"
         )
     if protocol not in PROTOCOLS:
-        raise ConfigError(
-            f"no protocol {protocol!r}", field="protocol", expected=f"one of {', '.join(PROTOCOLS)}"
-        )
+        raise unknown_name("protocol", protocol, PROTOCOLS, field="protocol")
     if protocol in ONE_FOLD:
         return [dict.fromkeys((row["sample_id"] for row in rows), ONE_FOLD[protocol])]
     if protocol == "by-pose":

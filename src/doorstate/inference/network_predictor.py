@@ -51,7 +51,7 @@ class NetworkPredictor(Predictor):
     ) -> None:
         self.backend = backend
         self.card = backend.card
-        self.num_points = self.card.points if num_points is None else num_points
+        self.num_points = self.card.points_in_use if num_points is None else num_points
         self.gate = gate
         self.clock = clock
         if self.num_points < MIN_POINTS:

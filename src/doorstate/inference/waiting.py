@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 
-from doorstate.errors import ConfigError
+from doorstate.errors import ConfigError, unknown_name
 from doorstate.inference.prediction import Prediction
 from doorstate.inference.predictor import Predictor
 from doorstate.inference.state_filter import FilteredState, StateFilter
@@ -100,5 +100,5 @@ def _parse_state(state: DoorState | str) -> DoorState:
     if isinstance(state, DoorState):
         return state
     if state not in STATES:
-        raise ConfigError(f"unknown state {state!r}", field="state", expected=f"one of {', '.join(STATES)}")
+        raise unknown_name("state", state, STATES, field="state")
     return DoorState[state.upper()]

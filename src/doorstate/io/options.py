@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from doorstate.errors import CameraError, ConfigError
+from doorstate.errors import CameraError, unknown_name
 from doorstate.io.camera import Intrinsics, Pinhole
 from doorstate.io.depth import check_roll
 from doorstate.types import UNITS_M
@@ -68,5 +68,5 @@ def metres_per_unit(name: str) -> float:
         ConfigError: no such unit.
     """
     if name not in UNITS_M:
-        raise ConfigError(f"no unit {name!r}", field="units", expected=", ".join(UNITS_M))
+        raise unknown_name("unit", name, UNITS_M, field="units")
     return UNITS_M[name]

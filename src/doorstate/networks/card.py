@@ -33,11 +33,11 @@ class WeightsCard(FrozenModel):
     doorstate_version: str = __version__
 
     @property
-    def points(self) -> int:
+    def points_in_use(self) -> int:
         """Number of points per cloud in use."""
         return self.default_points or self.num_points
 
     @property
     def spec(self) -> CloudSpec:
         """Preparation of the clouds that these weights take by default."""
-        return CloudSpec(num_points=self.points, max_depth_m=self.max_depth_m)
+        return CloudSpec(num_points=self.points_in_use, max_depth_m=self.max_depth_m)

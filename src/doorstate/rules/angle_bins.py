@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 import numpy as np
 
 from doorstate.rules.base import Parameters, Rule, RuleResult, state_by_angle
@@ -45,9 +43,9 @@ class AngleBinsRule(Rule[AngleBinsParameters]):
     `walls.state_without_leaf`.
     """
 
-    name: ClassVar[str] = "angle_bins"
-    source: ClassVar[str] = "plain baseline: usual on robots today"
-    defaults: ClassVar[type[Parameters]] = AngleBinsParameters
+    name = "angle_bins"
+    source = "plain baseline: usual on robots today"
+    defaults = AngleBinsParameters
 
     def __call__(self, cloud: Points) -> RuleResult:
         p = self.parameters

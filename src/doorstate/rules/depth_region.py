@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 import numpy as np
 
 from doorstate.rules.base import Detection, Parameters, Rule, RuleResult
@@ -37,9 +35,9 @@ class DepthRegionRule(Rule[DepthRegionParameters]):
     is no state. No angle; a leaf that covers the lane reads as closed.
     """
 
-    name: ClassVar[str] = "depth_region"
-    source: ClassVar[str] = "plain baseline: RoboCup@Home start doors"
-    defaults: ClassVar[type[Parameters]] = DepthRegionParameters
+    name = "depth_region"
+    source = "plain baseline: RoboCup@Home start doors"
+    defaults = DepthRegionParameters
 
     def __call__(self, cloud: Points) -> RuleResult:
         p = self.parameters

@@ -84,9 +84,9 @@ class OpenDoorRule(Rule[OpenDoorParameters]):
     Source: Kaleci & Turgut 2020, reconstructed from the publication.
     """
 
-    defaults = OpenDoorParameters
     name = "open_door"
     source = "Kaleci & Turgut 2020 (a reconstruction, not the authors' code)"
+    defaults = OpenDoorParameters
 
     def __call__(self, cloud: Points) -> RuleResult:
         if cloud.ndim != 3:

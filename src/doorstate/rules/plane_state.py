@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -80,9 +80,9 @@ class PlaneStateRule(Rule[PlaneStateParameters]):
     `walls.state_without_leaf`.
     """
 
-    name: ClassVar[str] = "plane_state"
-    source: ClassVar[str] = "Rusu et al. 2009"
-    defaults: ClassVar[type[Parameters]] = PlaneStateParameters
+    name = "plane_state"
+    source = "Rusu et al. 2009"
+    defaults = PlaneStateParameters
 
     def __call__(self, cloud: Points) -> RuleResult:
         p = self.parameters

@@ -70,9 +70,9 @@ class WallLeafAngleRule(Rule[WallLeafAngleParameters]):
     Source: Ning et al. 2023, Quintana et al. 2018, reconstructed from the publications.
     """
 
-    defaults = WallLeafAngleParameters
     name = "wall_leaf_angle"
     source = "Ning et al. 2023, Quintana et al. 2018 (a reconstruction, not the authors' code)"
+    defaults = WallLeafAngleParameters
 
     def __call__(self, cloud: Points) -> RuleResult:
         p = self.parameters

@@ -8,7 +8,7 @@ from typing import Literal
 from pydantic import Field
 
 from doorstate._models import FrozenModel
-from doorstate.errors import ConfigError
+from doorstate.errors import ConfigError, unknown_name
 from doorstate.simulation.frames import Frame
 from doorstate.simulation.generate import simulate_rows
 from doorstate.simulation.noise.sensors import find_sensor
@@ -68,7 +68,7 @@ def settings_for(
     """
     find_sensor(sensor)
     if preset not in PRESETS:
-        raise ConfigError(f"no preset {preset!r}", field="preset", expected=f"one of {', '.join(PRESETS)}")
+        raise unknown_name("preset", preset, PRESETS, field="preset")
     chosen = PRESETS[preset]
     if chosen.has_many_scenes and poses is not None:
         raise ConfigError(

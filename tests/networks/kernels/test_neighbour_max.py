@@ -15,7 +15,7 @@ from tests.networks.twins import assert_same, random_indices, rows
 def test_neighbour_max_is_the_maximum_of_gathered_rows(ties: bool) -> None:
     indices = random_indices(2, 6, 9, 4)
     values = rows(2, 9, 5)
-    if ties:  # the first of equal neighbours gets the gradient, as of torch.max
+    if ties:  # the first of equal neighbours gets the gradient, as in torch.max
         values = values.round()
     assert_same(lambda x: neighbour_max(x, indices), lambda x: plain.gather(x, indices).max(2).values, values)
     assert torch.equal(neighbour_max(values, indices), plain.gather(values, indices).amax(2))

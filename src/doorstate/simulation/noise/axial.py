@@ -17,7 +17,7 @@ _STEEPEST_RAD = np.float32(math.radians(85.0))  # assumed: the published term is
 
 
 class ConstantAxial(FrozenModel):
-    """The same standard deviation in all pixels."""
+    """Normal noise with one standard deviation for all pixels."""
 
     kind: Literal["constant"] = "constant"
     deviation_m: float = Field(ge=0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 
-from doorstate.errors import ConfigError
+from doorstate.errors import ConfigError, unknown_name
 from doorstate.simulation.camera import CAMERAS, DepthCamera
 from doorstate.simulation.noise.axial import ConstantAxial, NguyenAxial, StereoAxial
 from doorstate.simulation.noise.dropout import Grazing, Speckle
@@ -102,9 +102,5 @@ def find_sensor(name: str) -> SensorModel:
             )
         return gaussian(value)
     if name not in SENSORS:
-        raise ConfigError(
-            f"no sensor {name!r}",
-            field="sensor",
-            expected=f"one of {', '.join(SENSORS)}, or gaussian:METRES",
-        )
+        raise unknown_name("sensor", name, [*SENSORS, "gaussian:METRES"], field="sensor")
     return SENSORS[name]
