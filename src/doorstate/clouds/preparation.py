@@ -12,13 +12,13 @@ from doorstate._models import FrozenModel
 from doorstate.clouds.measured import MAX_COORDINATE, is_measured
 from doorstate.clouds.sampling import farthest_point_indices
 from doorstate.clouds.shape import check_shape
-from doorstate.clouds.thinning import thinned_pixels
 from doorstate.clouds.units import check_units, median_range_m
 from doorstate.errors import TooFewPointsError
 from doorstate.types import Indices, Points
 
 NUM_POINTS = 4096  # as in the paper
 MIN_POINTS = 128  # fewer cannot fill the largest neighbourhood of a network
+_PIXELS_PER_POINT = 16  # to sample from after thinning
 
 
 class CloudSpec(FrozenModel):
@@ -63,8 +63,12 @@ def prepare_cloud(points: Points, spec: CloudSpec = DEFAULT_SPEC) -> PreparedClo
     """
     cloud = check_shape(points)
     flat = cloud.reshape(-1, 3)
-    rows = thinned_pixels(cloud.shape, spec.num_points) if spec.thin else np.arange(len(flat))
-    flat = np.asarray(flat[rows] if spec.thin else flat, dtype=np.float32)
+    rows = np.arange(len(flat))
+    if spec.thin and cloud.ndim == 3:
+        height, width, _ = cloud.shape
+        rows = _thinned_rows(height, width, spec.num_points)
+        flat = flat[rows]
+    flat = np.asarray(flat, dtype=np.float32)
     measured = _measured_rows(flat)
     clean = flat[measured]
     check_units(clean)
@@ -77,6 +81,12 @@ def prepare_cloud(points: Points, spec: CloudSpec = DEFAULT_SPEC) -> PreparedClo
     if len(sampled) < min(spec.num_points, MIN_POINTS):
         raise _too_few(f"{len(sampled)} distinct of {len(clean)} measured")
     return PreparedCloud(clean[sampled], rows[measured[sampled]])
+
+
+def _thinned_rows(height: int, width: int, num_points: int) -> Indices:
+    """Return the rows, in the flattened image, of the pixels in every k-th row and column."""
+    step = max(1, int(np.sqrt(height * width / (_PIXELS_PER_POINT * num_points))))
+    return (np.arange(0, height, step)[:, None] * width + np.arange(0, width, step)).ravel()
 
 
 def _measured_rows(flat: Points) -> Indices:

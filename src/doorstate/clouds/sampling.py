@@ -77,9 +77,8 @@ def bucket_farthest_points(points: Points, count: int, height: int) -> Indices:
         height: height of the k-d tree that breaks ties.
     """
     tree_order = _tree_order(points, height)
-    rank = _buckets(
-        points[tree_order], max(1, len(points) // _POINTS_PER_BUCKET)
-    )  # (buckets, m), -1 = padding
+    num_buckets = max(1, len(points) // _POINTS_PER_BUCKET)
+    rank = _buckets(points[tree_order], num_buckets)  # (buckets, m), -1 = padding
     padding = rank < 0
     grouped = points[tree_order[rank]]  # (buckets, m, 3)
     low = np.where(padding[..., None], np.inf, grouped).min(axis=1)

@@ -191,9 +191,8 @@ class _NeighbourCache:
         neighbours = self._find(torch.from_numpy(self._points[new.numpy()]))
         if not self._cache:
             count, num_points, _ = self._points.shape
-            smallest = (
-                torch.int16 if num_points <= 2**15 else torch.int32
-            )  # a cloud can have a million indices
+            # A cloud can have a million indices.
+            smallest = torch.int16 if num_points <= 2**15 else torch.int32
             self._cache = tuple(torch.empty(count, *part.shape[1:], dtype=smallest) for part in neighbours)
         for cached, part in zip(self._cache, neighbours, strict=True):
             cached[new] = part.to(cached.dtype)

@@ -147,7 +147,5 @@ class Point2Sequence(PointNetwork):
         memory, hidden = self.encode_decode(areas)  # (B, M, 4, 128), (B, M, 128)
         region = self.attention(memory, hidden) if self.region_feature == "attention" else hidden
         region = self.region(region)  # (B, M, 128)
-        features = self.globals(
-            points[:, : self.num_centres], region
-        )  # (B, 1024), the maximum over the centres
-        return Encoding(features)
+        centres = points[:, : self.num_centres]  # (B, M, 3)
+        return Encoding(self.globals(centres, region))  # (B, 1024), the maximum over the centres

@@ -175,10 +175,10 @@ def _slabs(
     window: _Window, intrinsics: Intrinsics
 ) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]]:
     """Yield, for each axis of the box, z-depth at the near and the far plane and the ray's direction along the axis."""
-    left = (
-        -(np.arange(window.columns.start, window.columns.stop) - intrinsics.cx)[None, :] / intrinsics.fx
-    )  # (1, w)
-    up = -(np.arange(window.rows.start, window.rows.stop) - intrinsics.cy)[:, None] / intrinsics.fy  # (h, 1)
+    columns = np.arange(window.columns.start, window.columns.stop)[None, :]
+    rows = np.arange(window.rows.start, window.rows.stop)[:, None]
+    left = -(columns - intrinsics.cx) / intrinsics.fx  # (1, w)
+    up = -(rows - intrinsics.cy) / intrinsics.fy  # (h, 1)
     for axis in range(3):
         direction = _direction(window.rotation[axis], left, up)
         # A ray along a face divides by zero: +-inf is the right value, and 0/0 (on the face) counts as a miss.

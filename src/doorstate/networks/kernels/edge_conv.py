@@ -48,9 +48,8 @@ def edge_moments(features: Tensor, indices: Tensor) -> tuple[Tensor, Tensor]:
         (2C,) mean and (2C, 2C) covariance divided by the number of edges.
     """
     per_edge = features.new_full((1,), 1 / indices.numel()).expand(len(indices), indices[0].numel())
-    share = (
-        features.new_zeros(indices.shape[:2]).scatter_add_(1, indices.flatten(1), per_edge).view(-1, 1)
-    )  # (B * N, 1) of all edges
+    share = features.new_zeros(indices.shape[:2]).scatter_add_(1, indices.flatten(1), per_edge)  # (B, N)
+    share = share.view(-1, 1)  # (B * N, 1) of all edges
     flat = features.flatten(0, 1)
     mean = flat.mean(0)
     flat = flat - mean  # centred, so that the squares do not cancel

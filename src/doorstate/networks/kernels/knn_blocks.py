@@ -72,10 +72,8 @@ def nearest_in_blocks(query: Tensor, points: Tensor, labels: Tensor, k: int) -> 
     count, order = needed.sum(2).flatten().sort()
     lists = needed.byte().argsort(dim=2, descending=True, stable=True)
     lists = torch.where(needed.gather(2, lists), lists + first_block, len(right) - 1).flatten(0, 1)
-    before = (
-        needed.cumsum(2).diagonal(dim1=1, dim2=2).reshape(-1, 1, 1) - 1
-    )  # blocks listed before the query's own
-    # Column of the query itself.
+    # Blocks listed before the query's own, and the column of the query itself.
+    before = needed.cumsum(2).diagonal(dim1=1, dim2=2).reshape(-1, 1, 1) - 1
     own = before * size + torch.arange(size, device=points.device).view(1, -1, 1)  # (B * P, p, 1)
     neighbours = labels.new_empty(len(left), size, k)
     for chosen, width in _chunks(order, count, size * size):

@@ -53,9 +53,8 @@ class _WithMoments(torch.autograd.Function):
         rows, mean = ctx.saved_tensors
         slope = (covariance_grad + covariance_grad.T) / len(rows)
         rounded = slope.to(grad.dtype)
-        constant = (mean_grad / len(rows) - mean @ rounded.to(slope.dtype)).to(
-            grad.dtype
-        )  # cancels what is added
+        # The mean is multiplied by the rounded slope, as the rows are below, so that both cancel.
+        constant = (mean_grad / len(rows) - mean @ rounded.to(slope.dtype)).to(grad.dtype)
         for piece in pieces(len(rows), 2 * rows.shape[1]):
             grad[piece].add_(torch.addmm(constant, rows[piece], rounded))
         return grad
