@@ -12,7 +12,7 @@ from doorstate.errors import ConfigError, RunError
 from doorstate.evaluation.table import Table
 
 Result = dict[str, Any]
-"""One result as it is stored in JSON."""
+"""One result, in the form in which it is stored."""
 
 
 class Store:

@@ -38,7 +38,7 @@ def publish(name: str) -> Path:
 def publish_datasets(comparisons: Iterable[Results]) -> None:
     """Write the tested rows of data sets into `results/datasets`; rows of simulated clouds are enough to replay them.
 
-    A data set that is there already is left as it is.
+    An existing data set is not changed.
     """
     for results in comparisons:
         folder = paths.RESULTS / "datasets" / Path(results.config.dataset).name

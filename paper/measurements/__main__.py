@@ -22,7 +22,7 @@ app = typer.Typer(no_args_is_help=True, add_completion=False, rich_markup_mode=N
 def gate(
     out: Out = Path("docs/benchmarks"), network: Network = "ogurob-pointnet2", count: Count = 100
 ) -> None:
-    """Clouds that the gate rejects, and closed doors reported open, when parts of the cloud are missing."""
+    """Count clouds that the gate rejects, and closed doors reported open, when parts of the cloud are missing."""
     from doorstate.cli.console import progress_bar
 
     from .gate import gate_table, measure_gate
@@ -36,7 +36,7 @@ def gate(
 def thinning(
     out: Out = Path("docs/benchmarks"), network: Network = "ogurob-pointnet2", count: Count = 300
 ) -> None:
-    """Agreement of predictions from a part of the pixels with predictions from all pixels."""
+    """Compare predictions from a part of the pixels with predictions from all pixels."""
     from doorstate.cli.console import progress_bar
 
     from .thinning import measure_thinning, thinning_table
@@ -51,7 +51,7 @@ def sensors(
     out: Out = Path("docs/benchmarks"),
     frames: Annotated[int, typer.Option(help="Frames of each measurement.", min=1)] = 16,
 ) -> None:
-    """Noise, steps, shadows and missing pixels of the sensor models beside the published figures."""
+    """Compare noise, steps, shadows and missing pixels of the sensor models with published figures."""
     from doorstate.cli.console import progress_bar
 
     from .sensors import measure_sensors, sensors_table
@@ -69,7 +69,7 @@ def export(
     points: Annotated[int, typer.Option(help="Points of the exported networks.", min=128)] = 4096,
     count: Count = 102,
 ) -> None:
-    """Agreement of exported networks with torch, in float32 and with 8-bit matrices."""
+    """Compare exported networks with torch, in float32 and with 8-bit matrices."""
     from doorstate.cli.console import progress_bar
     from doorstate.inference.reference_clouds import reference_clouds
     from doorstate.networks import list_networks

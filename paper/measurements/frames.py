@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Frames of doors that no weights were trained on."""
+"""Simulated doors that no weights were trained on."""
 
 from __future__ import annotations
 

@@ -6,11 +6,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import pandas as pd
+
 from doorstate.evaluation.comparison import Results
 from doorstate.evaluation.factors import ANGLE, OCCLUSION, score_factors
 from doorstate.evaluation.heads import score_four_labels, score_heads, score_presence
 from doorstate.evaluation.method_scores import summarize_methods
 from doorstate.evaluation.table import (
+    Column,
     Table,
     count_column,
     interval_column,
@@ -128,9 +131,13 @@ def factor_table(results: Results, factor: str) -> Table:
     """Build the table of accuracy by one factor, a column for each bin."""
     bins = score_factors(results)
     bins = bins[bins["factor"] == factor]
-    titles = tuple(f"{low:g}–{high:g}" for low, high in zip(bins["low"], bins["high"], strict=True))
-    rows = (
-        ("samples", *map(str, bins["samples"])),
-        ("accuracy", *(number(value, 2) for value in bins["accuracy"])),
+    titles = [f"{low:g}–{high:g}" for low, high in zip(bins["low"], bins["high"], strict=True)]
+    rows = [
+        {"quantity": name, "digits": digits, **dict(zip(titles, bins[name], strict=True))}
+        for name, digits in (("samples", 0), ("accuracy", 2))
+    ]
+    columns = (
+        label_column("quantity", factor),
+        *(Column(title, (title, "digits"), number) for title in titles),
     )
-    return Table(f"Accuracy by {factor}", (factor, *titles), rows)
+    return Table.from_frame(f"Accuracy by {factor}", pd.DataFrame(rows), columns)

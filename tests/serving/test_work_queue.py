@@ -60,7 +60,7 @@ def test_large_file_is_refused_before_the_upload_ends(client: httpx.Client) -> N
         assert time.monotonic() - started < 5, "the connection is closed soon"
 
 
-def test_slow_clients_time_out_and_block_nobody() -> None:
+def test_slow_clients_time_out_and_do_not_block_others() -> None:
     with serving(timeout_s=0.7, queue=0) as client:
         head = "POST /predict?format=npy HTTP/1.1\r\nContent-Length: 1000"
         slow = [send_head(client, head) for _ in range(5)]

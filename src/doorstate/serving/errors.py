@@ -55,7 +55,7 @@ def add_error_handlers(app: FastAPI) -> None:
 
     @app.exception_handler(ClientDisconnect)
     async def disconnected(_: Request, error: ClientDisconnect) -> Response:
-        return _error_response(400, "the client closed the connection")  # nobody receives it
+        return _error_response(400, "the client closed the connection")  # for the log: the client is gone
 
     @app.exception_handler(Exception)
     async def internal_error(_: Request, error: Exception) -> Response:

@@ -45,7 +45,7 @@ class WorkQueue:
         self._limits = limits
         self._pool = ThreadPoolExecutor(limits.workers, "doorstate")
         self._slots = threading.Semaphore(limits.workers + limits.queue)
-        # An upload takes no slot, so that slow clients block nobody; its bytes are counted instead.
+        # An upload takes no slot, so that slow clients do not block others; its bytes are counted instead.
         self._max_total_bytes = (limits.workers + limits.queue) * limits.max_bytes
         self._total_bytes = 0
 

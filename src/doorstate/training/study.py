@@ -44,13 +44,13 @@ class Study(FrozenModel, ABC):
         """Write into the study's folder what its comparisons need; nothing by default."""
 
 
-def load_study(path: Path, study: type[S]) -> S:
-    """Return a study from a TOML file, named after the file unless it has a name.
+def load_study(path: Path, kind: type[S]) -> S:
+    """Return a study of one kind from a TOML file, named after the file unless it has a name.
 
     Raises:
         ConfigError: the file cannot be read, or a field is unknown or has a wrong value.
     """
     try:
-        return study.model_validate({"name": path.stem} | read_toml(path))
+        return kind.model_validate({"name": path.stem} | read_toml(path))
     except ValidationError as error:
-        raise ConfigError(first_validation_error(error, study.model_fields), path=path) from error
+        raise ConfigError(first_validation_error(error, kind.model_fields), path=path) from error
