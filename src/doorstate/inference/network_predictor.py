@@ -118,8 +118,8 @@ class NetworkPredictor(Predictor):
             CloudContentError: an array that is no cloud or not in metres, or one cloud in place of several.
         """
         started = self.clock()
-        cleaned = [check_single_cloud(cloud) for cloud in _check_batch(clouds)]
-        samples = [self._gate(cloud, self._sample(cloud)) for cloud in cleaned]
+        checked = [check_single_cloud(cloud) for cloud in _check_batch(clouds)]
+        samples = [self._sample(cloud) for cloud in checked]
         accepted = [sample.points for sample in samples if sample.abstention is None]
         outputs = iter(run_by_size(self.backend, accepted))
         milliseconds = (self.clock() - started) * 1000 / max(1, len(samples))
@@ -153,15 +153,12 @@ class NetworkPredictor(Predictor):
         self.backend(prepare_cloud(cloud, CloudSpec(num_points=self.num_points)).points[None])
 
     def _sample(self, cloud: Points) -> _Sample:
+        """Sample one cloud, unless it has too few points, and check it with the gate."""
         try:
-            return _Sample(self.prepare(cloud).points)
+            points = self.prepare(cloud).points
         except TooFewPointsError as error:
             return _Sample(_NO_POINTS, Abstention.from_error(error))
-
-    def _gate(self, cloud: Points, sample: _Sample) -> _Sample:
-        if self.gate is None or sample.abstention is not None:
-            return sample
-        return _Sample(sample.points, self.gate(cloud))
+        return _Sample(points, None if self.gate is None else self.gate(cloud))
 
 
 class _Sample(NamedTuple):
