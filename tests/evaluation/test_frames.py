@@ -101,7 +101,7 @@ def test_scores_count_the_predictions(results: FrameResults) -> None:
         results.score("colour")
 
 
-def test_the_frame_joins_predictions_with_the_index(results: FrameResults) -> None:
+def test_predictions_are_joined_with_the_index(results: FrameResults) -> None:
     frame = results.joined
     assert len(frame) == 10
     first = frame.iloc[0]

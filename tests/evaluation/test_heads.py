@@ -24,7 +24,9 @@ from doorstate.evaluation.heads import (
     score_presence,
 )
 from doorstate.evaluation.predictions import load_results
+from doorstate.evaluation.report import render_report
 from doorstate.evaluation.rule_outputs import score_angles
+from doorstate.evaluation.tables import build_tables
 from doorstate.types import NO_DOOR, STATES
 from tests.evaluation.conftest import MakeComparison
 
@@ -141,6 +143,12 @@ def test_angles_and_kinds_of_networks_are_scored(results: Results) -> None:
     kinds = score_kinds(results)
     by_door = kinds[kinds["kind"] == "door_kind"]
     assert by_door["samples"].sum() == by_door["correct"].sum() == 24
+
+
+def test_report_shows_the_tables_of_heads(results: Results, scene_dataset: PreparedDataset) -> None:
+    page = render_report(results, scene_dataset, build_tables(results), {})
+    for name in ("head_errors", "four_labels", "presence", "parts", "kinds"):
+        assert f'<figure class="table" id="{name}">' in page, name
 
 
 def test_networks_without_heads_have_no_rows(

@@ -44,7 +44,7 @@ def test_whole_comparison(simulated: PreparedDataset, make_comparison: MakeCompa
     assert sum(results.role_counts(0).values()) == len(simulated.rows)
 
 
-def test_frame_joins_predictions_with_the_manifest(
+def test_predictions_are_joined_with_the_manifest(
     simulated: PreparedDataset, make_comparison: MakeComparison
 ) -> None:
     folder = make_comparison(simulated)
