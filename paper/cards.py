@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from doorstate.clouds.augmentation import Augmentation
-from doorstate.evaluation.comparison import Results
 from doorstate.evaluation.heads import head_errors, head_rows, score_four_labels
 from doorstate.evaluation.method_scores import MACRO, score_states
+from doorstate.evaluation.results import Results
 from doorstate.networks.card import WeightsCard
 from doorstate.training.run_folder import RunFolder, read_json
 from doorstate.types import STATES

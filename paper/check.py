@@ -7,8 +7,8 @@ import math
 import re
 from collections.abc import Iterator
 
-from doorstate.evaluation.comparison import Results
 from doorstate.evaluation.metrics import macro_f1
+from doorstate.evaluation.results import Results
 
 from . import paths
 from .definition import read_definitions

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from doorstate._files import write_csv
 from doorstate.dataset.store import open_dataset
-from doorstate.evaluation.comparison import Results
 from doorstate.evaluation.predictions import load_results, save_results
+from doorstate.evaluation.results import Results
 from doorstate.evaluation.study import load_study_results, save_study_results
 from doorstate.simulation.manifest import MANIFEST_FILE
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 from functools import cache
 
-from doorstate.evaluation.comparison import Results
 from doorstate.evaluation.predictions import join_results, load_results
+from doorstate.evaluation.results import Results
 from doorstate.evaluation.study import StudyResults, load_study_results
 
 from . import paths

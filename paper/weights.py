@@ -17,9 +17,9 @@ import numpy as np
 
 from doorstate._files import write_text
 from doorstate.evaluation.calibration import calibrate, labels_and_probabilities, reliability
-from doorstate.evaluation.comparison import Results
 from doorstate.evaluation.heads import head_rows
 from doorstate.evaluation.resolution import fewest_points, score_resolution
+from doorstate.evaluation.results import Results
 from doorstate.networks.weights import load_weights, save_weights
 from doorstate.training.calibration import abstain_threshold, at_temperature
 from doorstate.training.comparison import read_comparison

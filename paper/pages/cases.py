@@ -8,8 +8,8 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 import pandas as pd
 
-from doorstate.evaluation.comparison import Results
 from doorstate.evaluation.pairwise import correct_by_method
+from doorstate.evaluation.results import Results
 from doorstate.types import ABSTAINED
 
 Case = Callable[[pd.DataFrame], "pd.Series[bool]"]

@@ -8,10 +8,10 @@ from typing import Any
 
 import pandas as pd
 
-from doorstate.evaluation.comparison import Results
 from doorstate.evaluation.factors import ANGLE, OCCLUSION, score_factors
 from doorstate.evaluation.heads import score_four_labels, score_heads, score_presence
 from doorstate.evaluation.method_scores import summarize_methods
+from doorstate.evaluation.results import Results
 from doorstate.evaluation.table import (
     Column,
     Table,

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 import pandas as pd
 
-from doorstate.evaluation.comparison import Results
+from doorstate.evaluation.results import Results
 
 from .cases import Case
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from doorstate.evaluation.comparison import PROBABILITY_COLUMNS
 from doorstate.evaluation.frame_scores import score_frames
+from doorstate.evaluation.results import PROBABILITY_COLUMNS
 from doorstate.evaluation.table import (
     Column,
     Table,

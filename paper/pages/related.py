@@ -8,8 +8,8 @@ from typing import Any
 
 import pandas as pd
 
-from doorstate.evaluation.comparison import Results
 from doorstate.evaluation.method_scores import summarize_methods
+from doorstate.evaluation.results import Results
 from doorstate.evaluation.rule_outputs import score_angles
 from doorstate.evaluation.strata import ALL
 from doorstate.evaluation.table import Table, count_column, interval_column, number_column

@@ -10,9 +10,9 @@ from typing import Any
 import pandas as pd
 
 from doorstate.evaluation.calibration import score_calibration
-from doorstate.evaluation.comparison import Results
 from doorstate.evaluation.method_scores import MACRO, score_states, summarize_methods
 from doorstate.evaluation.resolution import score_resolution
+from doorstate.evaluation.results import Results
 from doorstate.evaluation.study import StudyResults
 from doorstate.evaluation.table import (
     Column,

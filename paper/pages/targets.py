@@ -11,9 +11,9 @@ from functools import partial
 import pandas as pd
 
 from doorstate.evaluation.calibration import calibrate, reliability
-from doorstate.evaluation.comparison import Results
 from doorstate.evaluation.heads import head_errors, head_rows
 from doorstate.evaluation.metrics import macro_f1
+from doorstate.evaluation.results import Results
 from doorstate.evaluation.table import Column, Table, label_column, number
 from doorstate.evaluation.undecidable import is_undecidable
 from doorstate.types import NO_DOOR

@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 from matplotlib.figure import Figure
 
-from doorstate.evaluation.comparison import Results
 from doorstate.evaluation.figures.encode import encode_figures
+from doorstate.evaluation.results import Results
 
 from ..published import side_by_side
 

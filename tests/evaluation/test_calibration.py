@@ -16,9 +16,9 @@ from doorstate.evaluation.calibration import (
     reliability,
     score_calibration,
 )
-from doorstate.evaluation.comparison import Results
 from doorstate.evaluation.figures.reliability import reliability_figure
 from doorstate.evaluation.predictions import load_results
+from doorstate.evaluation.results import Results
 from doorstate.training.calibration import fit_temperature
 from tests.evaluation.conftest import MakeComparison
 

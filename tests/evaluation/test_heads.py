@@ -12,7 +12,6 @@ import pytest
 from doorstate._files import write_csv
 from doorstate.dataset.splits import draw_splits, write_splits
 from doorstate.dataset.store import PreparedDataset
-from doorstate.evaluation.comparison import Results
 from doorstate.evaluation.factors import score_kinds
 from doorstate.evaluation.head_tables import head_tables
 from doorstate.evaluation.heads import (
@@ -25,6 +24,7 @@ from doorstate.evaluation.heads import (
 )
 from doorstate.evaluation.predictions import load_results
 from doorstate.evaluation.report import render_report
+from doorstate.evaluation.results import Results
 from doorstate.evaluation.rule_outputs import score_angles
 from doorstate.evaluation.tables import build_tables
 from doorstate.types import NO_DOOR, STATES

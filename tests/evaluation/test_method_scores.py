@@ -8,7 +8,6 @@ import pytest
 from sklearn.metrics import classification_report, f1_score
 
 from doorstate.dataset.store import PreparedDataset
-from doorstate.evaluation.comparison import Results
 from doorstate.evaluation.method_scores import (
     MACRO,
     confusion_counts,
@@ -18,6 +17,7 @@ from doorstate.evaluation.method_scores import (
     summarize_methods,
 )
 from doorstate.evaluation.predictions import load_results
+from doorstate.evaluation.results import Results
 from doorstate.types import ABSTAINED, STATES
 from tests.evaluation.conftest import MakeComparison
 

@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 from doorstate.evaluation.calibration import score_calibration
-from doorstate.evaluation.comparison import Results
 from doorstate.evaluation.method_scores import confusion_counts, summarize_methods
 from doorstate.evaluation.pairwise import pairwise_tests
 from doorstate.evaluation.predictions import load_results
+from doorstate.evaluation.results import Results
 from doorstate.evaluation.strata import score_strata
 from doorstate.evaluation.undecidable import decidable_accuracy
 

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from doorstate.evaluation.comparison import PROBABILITY_COLUMNS, Results
 from doorstate.evaluation.metrics import Floats, label_codes, mean_and_deviation, ratio
+from doorstate.evaluation.results import PROBABILITY_COLUMNS, Results
 from doorstate.training.calibration import at_temperature, fit_temperature
 from doorstate.types import NO_DOOR, STATES, Indices
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from doorstate.clouds.preparation import NUM_POINTS
 from doorstate.dataset.splits import NUM_FOLDS
-from doorstate.evaluation.comparison import Results
+from doorstate.evaluation.results import Results
 from doorstate.evaluation.strata import has_strata
 from doorstate.evaluation.stratum_tables import NO_STRATA, NO_TWINS
 from doorstate.evaluation.table import number

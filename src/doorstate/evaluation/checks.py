@@ -12,7 +12,7 @@ import pandas as pd
 
 from doorstate.dataset.splits import Role
 from doorstate.errors import RunError
-from doorstate.evaluation.comparison import PROBABILITY_COLUMNS, Results
+from doorstate.evaluation.results import PROBABILITY_COLUMNS, Results
 from doorstate.types import NO_DOOR, PREDICTED_LABELS, STATES
 
 _AGAIN = "test this run again"

@@ -12,8 +12,8 @@ import pandas as pd
 
 from doorstate._files import read_csv
 from doorstate.errors import DatasetError, RunError
-from doorstate.evaluation.comparison import PROBABILITY_COLUMNS, TEXT_COLUMNS, RunRecord
 from doorstate.evaluation.detections import Detections, read_detections
+from doorstate.evaluation.results import PROBABILITY_COLUMNS, TEXT_COLUMNS, RunRecord
 from doorstate.training.run_folder import RunFolder, read_json, run_of
 
 COMPARISON, SPLITS = "comparison.json", "splits.csv"

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import pandas as pd
 
-from doorstate.evaluation.comparison import PROBABILITY_COLUMNS, Results
 from doorstate.evaluation.manifest import number_values, text_values
+from doorstate.evaluation.results import PROBABILITY_COLUMNS, Results
 from doorstate.evaluation.undecidable import is_undecidable
 from doorstate.types import PREDICTED_LABELS, STATES
 

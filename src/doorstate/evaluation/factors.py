@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from doorstate.evaluation.comparison import Results
 from doorstate.evaluation.manifest import number_values, text_values
 from doorstate.evaluation.metrics import Floats
+from doorstate.evaluation.results import Results
 from doorstate.types import Indices
 
 

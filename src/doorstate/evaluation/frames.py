@@ -13,9 +13,9 @@ import pandas as pd
 from doorstate._jobs import Progress, no_progress
 from doorstate.dataset.labelled import LabelledFrame, check_column
 from doorstate.errors import DoorstateError
-from doorstate.evaluation.comparison import TEXT_COLUMNS, join_manifest
 from doorstate.evaluation.frame_scores import FrameScores, score_frames
 from doorstate.evaluation.manifest import text_values
+from doorstate.evaluation.results import TEXT_COLUMNS, join_manifest
 from doorstate.inference.abstention import Abstention
 from doorstate.inference.prediction import Prediction
 from doorstate.inference.predictor import Predictor

@@ -11,10 +11,10 @@ from typing import Any
 import pandas as pd
 
 from doorstate.dataset.store import PreparedDataset
-from doorstate.evaluation.comparison import PROBABILITY_COLUMNS, Results
 from doorstate.evaluation.detections import encode_detections
 from doorstate.evaluation.errors import order_errors
 from doorstate.evaluation.pages import encode_cloud, missed_by, picture_uri
+from doorstate.evaluation.results import PROBABILITY_COLUMNS, Results
 from doorstate.evaluation.undecidable import is_undecidable
 
 CARDS_PER_METHOD = 16

@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
-from doorstate.evaluation.comparison import Results
 from doorstate.evaluation.heads import PART_NAMES, score_four_labels, score_heads, score_parts, score_presence
+from doorstate.evaluation.results import Results
 from doorstate.evaluation.table import Column, Table, count_column, label_column, number_column
 from doorstate.networks.heads import HEADS
 from doorstate.types import NO_DOOR, STATES

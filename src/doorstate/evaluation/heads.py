@@ -8,8 +8,8 @@ from collections.abc import Iterator
 import numpy as np
 import pandas as pd
 
-from doorstate.evaluation.comparison import KEY_COLUMNS, RULE_COLUMNS, Results, predicted_column
 from doorstate.evaluation.manifest import number_values, text_values
+from doorstate.evaluation.results import KEY_COLUMNS, RULE_COLUMNS, Results, predicted_column
 from doorstate.networks.heads import HEADS, POINT_HEADS, head_metrics
 from doorstate.types import DECISION_THRESHOLD, NO_DOOR, PARTS, STATES
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import pandas as pd
 
 from doorstate.errors import RunError
-from doorstate.evaluation.comparison import Results, order_predictions
+from doorstate.evaluation.results import Results, order_predictions
 
 
 def join_results(parts: Sequence[Results]) -> Results:

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from doorstate.evaluation.comparison import Results
 from doorstate.evaluation.intervals import F1Intervals, Interval, bootstrap_f1, bounds, wilson_interval
 from doorstate.evaluation.manifest import text_values
 from doorstate.evaluation.metrics import (
@@ -19,6 +18,7 @@ from doorstate.evaluation.metrics import (
     precision_recall_f1,
     ratio,
 )
+from doorstate.evaluation.results import Results
 from doorstate.types import ABSTAINED, PREDICTED_LABELS, STATES
 
 MACRO = "macro"

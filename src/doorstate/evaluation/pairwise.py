@@ -10,7 +10,7 @@ import pandas as pd
 from statsmodels.stats.contingency_tables import mcnemar
 from statsmodels.stats.multitest import multipletests
 
-from doorstate.evaluation.comparison import Results
+from doorstate.evaluation.results import Results
 
 
 def correct_by_method(results: Results) -> pd.DataFrame:

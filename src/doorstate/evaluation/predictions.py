@@ -15,10 +15,10 @@ from doorstate.dataset.store import manifest_path
 from doorstate.errors import DatasetError, RunError, first_validation_error
 from doorstate.evaluation import comparison_folder, published
 from doorstate.evaluation.checks import check_predictions
-from doorstate.evaluation.comparison import ComparisonConfig, Results, RunRecord, order_predictions
 from doorstate.evaluation.join import join_results
 from doorstate.evaluation.manifest import read_manifest
 from doorstate.evaluation.published import save_results
+from doorstate.evaluation.results import ComparisonConfig, Results, RunRecord, order_predictions
 from doorstate.rules.base import Detection
 from doorstate.training.run_folder import read_json, run_of
 

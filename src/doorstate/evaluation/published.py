@@ -19,7 +19,7 @@ import pandas as pd
 from doorstate._files import write_compressed_text, write_text
 from doorstate.dataset.splits import write_splits
 from doorstate.errors import RunError
-from doorstate.evaluation.comparison import KEY_COLUMNS, TEXT_COLUMNS, Results, RunRecord
+from doorstate.evaluation.results import KEY_COLUMNS, TEXT_COLUMNS, Results, RunRecord
 from doorstate.training.run_folder import read_json
 
 EXPERIMENT, METRICS = "experiment.json", "metrics.json"

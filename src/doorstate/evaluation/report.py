@@ -13,7 +13,6 @@ import numpy as np
 from doorstate._files import write_text
 from doorstate.dataset.store import PreparedDataset, open_dataset
 from doorstate.evaluation.caveats import PROTOCOLS, caveats
-from doorstate.evaluation.comparison import Results
 from doorstate.evaluation.figures.draw import draw_dataset_figures, draw_figures
 from doorstate.evaluation.figures.encode import save_figures
 from doorstate.evaluation.gallery import build_gallery
@@ -22,6 +21,7 @@ from doorstate.evaluation.method_scores import predicted_labels
 from doorstate.evaluation.metrics import confusion, ratio
 from doorstate.evaluation.pages import data_uri, render_page
 from doorstate.evaluation.predictions import join_results, load_results
+from doorstate.evaluation.results import Results
 from doorstate.evaluation.stratum_tables import dataset_tables
 from doorstate.evaluation.table import Table
 from doorstate.evaluation.tables import build_tables, save_tables

@@ -6,9 +6,9 @@ from __future__ import annotations
 import pandas as pd
 
 from doorstate.dataset.strata import REGIONS
-from doorstate.evaluation.comparison import Results
 from doorstate.evaluation.manifest import number_values, text_values
 from doorstate.evaluation.metrics import ratio
+from doorstate.evaluation.results import Results
 from doorstate.evaluation.strata import ALL
 from doorstate.types import ABSTAINED
 

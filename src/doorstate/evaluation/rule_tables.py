@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from doorstate.evaluation.comparison import Results
+from doorstate.evaluation.results import Results
 from doorstate.evaluation.rule_outputs import count_abstentions, score_angles, score_open_or_not
 from doorstate.evaluation.table import Table, count_column, label_column, number_column
 

@@ -7,9 +7,9 @@ import math
 
 import pandas as pd
 
-from doorstate.evaluation.comparison import PROBABILITY_COLUMNS, Results
 from doorstate.evaluation.errors import RANGES, list_errors, summarize_errors
 from doorstate.evaluation.method_scores import fold_scores
+from doorstate.evaluation.results import PROBABILITY_COLUMNS, Results
 from doorstate.evaluation.table import (
     UNDEFINED,
     Column,

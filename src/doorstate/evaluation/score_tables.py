@@ -6,7 +6,6 @@ from __future__ import annotations
 import pandas as pd
 
 from doorstate.evaluation.calibration import BINS, score_calibration
-from doorstate.evaluation.comparison import Results
 from doorstate.evaluation.factors import score_factors, score_kinds
 from doorstate.evaluation.method_scores import (
     confusion_counts,
@@ -17,6 +16,7 @@ from doorstate.evaluation.method_scores import (
 )
 from doorstate.evaluation.metrics import mean_and_deviation
 from doorstate.evaluation.pairwise import pairwise_tests
+from doorstate.evaluation.results import Results
 from doorstate.evaluation.table import (
     UNDEFINED,
     Table,

@@ -8,9 +8,9 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from doorstate.dataset.strata import BANDS, REGIONS
-from doorstate.evaluation.comparison import Results
 from doorstate.evaluation.manifest import text_values
 from doorstate.evaluation.metrics import confusion_cells, label_codes, precision_recall_f1
+from doorstate.evaluation.results import Results
 from doorstate.types import NO_DOOR, PREDICTED_LABELS, STATES, Indices
 
 ALL = "all"

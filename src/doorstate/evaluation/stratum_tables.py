@@ -8,7 +8,7 @@ import math
 import pandas as pd
 
 from doorstate.dataset.strata import REGIONS
-from doorstate.evaluation.comparison import Results
+from doorstate.evaluation.results import Results
 from doorstate.evaluation.strata import ALL, STRATUM_BANDS, count_samples, has_strata, score_strata
 from doorstate.evaluation.table import (
     UNDEFINED,

@@ -17,7 +17,6 @@ import pandas as pd
 
 from doorstate._files import read_csv, write_csv, write_text
 from doorstate.errors import RunError
-from doorstate.evaluation.comparison import Results
 from doorstate.evaluation.comparison_folder import COMPARISON
 from doorstate.evaluation.predictions import load_part, load_results
 from doorstate.evaluation.published import (
@@ -30,6 +29,7 @@ from doorstate.evaluation.published import (
     read_predictions,
     write_predictions,
 )
+from doorstate.evaluation.results import Results
 from doorstate.training.run_folder import read_json
 
 LATENCY = "latency.csv"

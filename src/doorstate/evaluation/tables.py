@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from doorstate._files import write_text
-from doorstate.evaluation.comparison import Results
 from doorstate.evaluation.head_tables import head_tables
+from doorstate.evaluation.results import Results
 from doorstate.evaluation.rule_tables import abstentions_table, angle_table, open_or_not_table
 from doorstate.evaluation.run_tables import error_kinds_table, misclassified_table, runs_table
 from doorstate.evaluation.score_tables import (

@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import pandas as pd
 
-from doorstate.evaluation.comparison import Results
 from doorstate.evaluation.manifest import text_values
 from doorstate.evaluation.metrics import accuracy, confusion, ratio
+from doorstate.evaluation.results import Results
 from doorstate.evaluation.strata import ALL
 from doorstate.types import STATES
 

@@ -6,7 +6,6 @@ from __future__ import annotations
 from matplotlib.figure import Figure
 
 from doorstate.dataset.store import PreparedDataset
-from doorstate.evaluation.comparison import Results
 from doorstate.evaluation.figures.encode import encode_figures
 from doorstate.evaluation.figures.errors import common_errors_figure, surest_errors_figure
 from doorstate.evaluation.figures.factors import factors_figure
@@ -16,6 +15,7 @@ from doorstate.evaluation.figures.reliability import reliability_figure
 from doorstate.evaluation.figures.samples import samples_figure
 from doorstate.evaluation.figures.scores import confusion_figure, spread_figure
 from doorstate.evaluation.manifest import manifest_frame
+from doorstate.evaluation.results import Results
 
 
 def draw_figures(results: Results, dataset: PreparedDataset) -> dict[str, bytes]:

@@ -10,10 +10,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from doorstate.dataset.store import PreparedDataset
-from doorstate.evaluation.comparison import Results
 from doorstate.evaluation.detections import draw_detections
 from doorstate.evaluation.errors import order_errors
 from doorstate.evaluation.figures.samples import draw_cloud, part_legend
+from doorstate.evaluation.results import Results
 from doorstate.evaluation.views import STATE_WORDS, picture_axes
 
 _COLUMNS = 5

@@ -8,8 +8,8 @@ import math
 import pandas as pd
 from matplotlib.figure import Figure
 
-from doorstate.evaluation.comparison import Results
 from doorstate.evaluation.factors import FACTORS, score_factors
+from doorstate.evaluation.results import Results
 from doorstate.evaluation.views import NETWORK_COLORS, graph_axes
 
 _MIN_SAMPLES = 10  # of a bin that is drawn

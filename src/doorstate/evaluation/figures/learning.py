@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
-from doorstate.evaluation.comparison import Results, RunRecord
+from doorstate.evaluation.results import Results, RunRecord
 from doorstate.evaluation.views import graph_axes, outside_legend
 
 _TICKS = (0.0, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5)

@@ -15,8 +15,8 @@ from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
 from doorstate.dataset.strata import REGIONS
-from doorstate.evaluation.comparison import Results
 from doorstate.evaluation.metrics import Floats
+from doorstate.evaluation.results import Results
 from doorstate.evaluation.undecidable import is_undecidable
 from doorstate.evaluation.views import REGION_COLORS, STATE_COLORS, STATE_WORDS, outside_legend
 from doorstate.simulation.manifest import unflatten

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from doorstate.evaluation.calibration import BINS, calibrate, reliability
-from doorstate.evaluation.comparison import Results
+from doorstate.evaluation.results import Results
 from doorstate.evaluation.views import graph_axes, outside_legend
 from doorstate.types import STATES
 

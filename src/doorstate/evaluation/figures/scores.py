@@ -7,9 +7,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from doorstate.evaluation.comparison import Results
 from doorstate.evaluation.method_scores import f1_intervals, fold_scores, predicted_labels
 from doorstate.evaluation.metrics import confusion, macro_f1, ratio
+from doorstate.evaluation.results import Results
 from doorstate.evaluation.views import STATE_WORDS, graph_axes, outside_legend
 from doorstate.types import STATES
 
