@@ -9,7 +9,7 @@ import socket
 import threading
 import time
 import webbrowser
-from contextlib import suppress
+from contextlib import closing, suppress
 from functools import partial
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
@@ -128,9 +128,9 @@ def listen_and_stop(port: int, last: str, events: list[str]) -> None:
                 connection.request("GET", "/events")
                 break
             time.sleep(0.05)
-        response = connection.getresponse()
-        while last not in "".join(events):
-            events.append(response.readline().decode())
+        with closing(connection), closing(connection.getresponse()) as response:
+            while last not in "".join(events):
+                events.append(response.readline().decode())
     finally:
         main_thread = threading.main_thread().ident
         assert main_thread is not None
