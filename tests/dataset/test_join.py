@@ -83,9 +83,9 @@ def test_the_depth_limit_is_kept_only_if_all_sources_have_one(
         shutil.copytree(scene_dataset.folder.parent / name, parts[-1])
         description = open_dataset(parts[-1]).description
         description.model_copy(update={"max_depth_m": limit_m}).save(parts[-1])
-    assert join_datasets(parts, tmp_path / "both").max_depth_m == 3.0
+    assert join_datasets(parts, tmp_path / "both").depth_range_m == 3.0
     parts[0] = scene_dataset.folder.parent / "varied-160"
-    assert join_datasets(parts, tmp_path / "one").max_depth_m == scene_dataset.max_depth_m == 5.0
+    assert join_datasets(parts, tmp_path / "one").depth_range_m == scene_dataset.depth_range_m == 5.0
 
 
 def test_incompatible_sources_are_refused(

@@ -174,7 +174,7 @@ def test_clouds_end_at_the_maximum_depth(tiny_simulation: Path, tmp_path: Path) 
     preparation = Preparation(tiny_simulation, CloudSpec(num_points=NUM_POINTS, max_depth_m=3.0))
     near = prepare_dataset(preparation, tmp_path / "near", workers=1).dataset
     far = prepare_dataset(Preparation(tiny_simulation, SPEC), tmp_path / "far", workers=1).dataset
-    assert (near.max_depth_m, far.max_depth_m) == (3.0, 5.0)
+    assert (near.depth_range_m, far.depth_range_m) == (3.0, 5.0)
     assert near.clouds[..., 0].max() <= 3.0 < far.clouds[..., 0].max()
     with pytest.raises(ConfigError, check=about(tmp_path / "near")):
         prepare_dataset(

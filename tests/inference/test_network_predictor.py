@@ -294,4 +294,4 @@ def test_points_beyond_the_depth_of_the_training_data_are_ignored(small_dataset:
 
 
 def test_a_simulated_dataset_has_the_range_of_its_camera(small_dataset: PreparedDataset) -> None:
-    assert small_dataset.max_depth_m == 5.0
+    assert small_dataset.depth_range_m == 5.0

@@ -25,7 +25,7 @@ def report(
 ) -> None:
     """Write a report of comparisons or of one data set.
 
-    The folder gets tables, figures and a self-contained HTML page.
+    The folder gets tables and figures; that of comparisons also a self-contained HTML page.
 
     \b
     Examples:

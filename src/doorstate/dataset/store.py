@@ -85,7 +85,7 @@ class PreparedDataset:
         return self.description.num_points
 
     @property
-    def max_depth_m(self) -> float | None:
+    def depth_range_m(self) -> float | None:
         """Largest depth of the clouds, the farthest if cameras differ; None if unknown."""
         ranges = {row.get("camera.max_depth_m", "") for row in self.rows}
         camera_m = None if "" in ranges else max(map(float, ranges), default=None)

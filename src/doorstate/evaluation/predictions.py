@@ -28,7 +28,7 @@ _DATASETS = "datasets"  # beside published comparisons: manifests of their data 
 
 
 def is_comparison(folder: Path) -> bool:
-    """Tell whether a folder holds a comparison, as training leaves it or published."""
+    """Return True if a folder holds a comparison, as training leaves it or as published."""
     return (folder / comparison_folder.COMPARISON).is_file() or _is_published(folder)
 
 

@@ -19,7 +19,7 @@ STRATUM_BANDS, STRATUM_REGIONS = (*BANDS, ALL), (*REGIONS, ALL)
 
 
 def has_strata(manifest: pd.DataFrame) -> bool:
-    """Tell whether at least one sample lies in a known band and region."""
+    """Return True if at least one sample lies in a known band and region."""
     return bool(_in_strata(manifest).any())
 
 

@@ -18,7 +18,7 @@ def is_undecidable(frame: pd.DataFrame) -> pd.Series[bool]:
 
 
 def records_twins(manifest: pd.DataFrame) -> bool:
-    """Tell whether the data set records which frames are undecidable."""
+    """Return True if the data set records which samples are undecidable."""
     return "same_image_as" in manifest and bool((text_values(manifest, "pose_id") != "").any())
 
 

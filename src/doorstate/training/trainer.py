@@ -219,6 +219,6 @@ class Trainer:
             network_options=config.all_network_options,
             num_points=config.num_points,
             heads=config.heads,
-            max_depth_m=dataset.max_depth_m,
+            max_depth_m=dataset.depth_range_m,
             trained_on=f"{dataset.description.source}, protocol {config.protocol}, fold {config.fold}{extra}",
         )
