@@ -7,7 +7,7 @@ import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from doorstate.clouds.augmentation import Augmentation
 from doorstate.evaluation.heads import head_errors, head_rows, score_four_labels
@@ -19,8 +19,26 @@ from doorstate.types import STATES
 
 from .paths import TITLES
 
-if TYPE_CHECKING:
-    from .weights import Evidence
+
+@dataclass(frozen=True)
+class Evidence:
+    """Published scores of weights or of their recipe.
+
+    Attributes:
+        temperature: divides the logits.
+        abstain_below: probability below which the weights abstain.
+        default_points: number of points that loses nothing; None if no study tells.
+        calibration_error: expected calibration error after scaling.
+        comparisons: published results to show on the card.
+        named: share of tested doors that are given a state, and share of these that is correct; None without threshold.
+    """
+
+    temperature: float
+    abstain_below: float
+    default_points: int | None
+    calibration_error: float
+    comparisons: tuple[Results, ...]
+    named: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)

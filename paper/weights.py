@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
 
@@ -27,7 +26,7 @@ from doorstate.training.run_folder import run_of
 from doorstate.types import DECISION_THRESHOLD, NO_DOOR
 
 from . import paths
-from .cards import Training, model_card
+from .cards import Evidence, Training, model_card
 from .definition import Definition, read_definitions
 from .published import comparison, study
 
@@ -36,27 +35,6 @@ FEWEST_POINTS = 1024
 LARGEST_LOSS = 0.002
 WRONG_SHARE = 0.05  # of validation samples with a state; a smaller share leaves few of them (paper/log.md)
 RECIPE_PROTOCOLS = ("paper", "by-pose")
-
-
-@dataclass(frozen=True)
-class Evidence:
-    """Published scores of weights or of their recipe.
-
-    Attributes:
-        temperature: divides the logits.
-        abstain_below: probability below which the weights abstain.
-        default_points: number of points that loses nothing; None if no study tells.
-        calibration_error: expected calibration error after scaling.
-        comparisons: published results to show on the card.
-        named: share of tested doors that are given a state, and share of these that is correct; None without threshold.
-    """
-
-    temperature: float
-    abstain_below: float
-    default_points: int | None
-    calibration_error: float
-    comparisons: tuple[Results, ...]
-    named: tuple[float, float] | None = None
 
 
 def package_weights(

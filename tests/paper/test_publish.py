@@ -11,7 +11,8 @@ import pytest
 from pandas.testing import assert_frame_equal
 from paper.publish import publish
 
-from doorstate.dataset.splits import Role, read_splits, write_splits
+from doorstate.dataset.roles import Role
+from doorstate.dataset.splits import read_splits, write_splits
 from doorstate.dataset.store import PreparedDataset, open_dataset
 from doorstate.errors import RunError
 from doorstate.evaluation.predictions import load_results

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from doorstate.dataset.splits import Role, draw_splits
+from doorstate.dataset.roles import Role
+from doorstate.dataset.splits import draw_splits
 from doorstate.dataset.store import PreparedDataset
 from doorstate.training.run import train_run
 from tests.training.runs import run_config

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 import torch
 
-from doorstate.dataset.splits import Role
+from doorstate.dataset.roles import Role
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import RunError
 from doorstate.training.run import train_run

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from doorstate.dataset.splits import Role
+from doorstate.dataset.roles import Role
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import ConfigError, DatasetError
 from doorstate.training.run import train_run

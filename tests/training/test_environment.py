@@ -12,7 +12,7 @@ import pytest
 import torch
 from torch._dynamo.exc import TorchDynamoException
 
-from doorstate.dataset.splits import Role
+from doorstate.dataset.roles import Role
 from doorstate.dataset.store import PreparedDataset
 from doorstate.training.environment import describe_environment
 from doorstate.training.run import train_run

@@ -14,7 +14,7 @@ from doorstate._files import read_csv
 from doorstate.clouds.preparation import CloudSpec
 from doorstate.dataset.preparation import Preparation
 from doorstate.dataset.prepare import prepare_dataset
-from doorstate.dataset.splits import Role
+from doorstate.dataset.roles import Role
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import ConfigError, DatasetError
 from doorstate.rules import create_rule, list_rules

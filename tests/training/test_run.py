@@ -12,7 +12,7 @@ import torch
 from sklearn.metrics import f1_score
 
 from doorstate._files import read_csv
-from doorstate.dataset.splits import Role
+from doorstate.dataset.roles import Role
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import ConfigError, RunError, WeightsError
 from doorstate.networks.weights import load_weights

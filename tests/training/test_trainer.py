@@ -11,7 +11,7 @@ import torch
 from doorstate._files import read_csv
 from doorstate.clouds.augmentation import Augmentation
 from doorstate.dataset.loader import Batch
-from doorstate.dataset.splits import Role
+from doorstate.dataset.roles import Role
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import RunError
 from doorstate.networks.pointnet2 import PointNet2

@@ -10,16 +10,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from doorstate.dataset.roles import Role
 from doorstate.errors import DatasetError
-
-if TYPE_CHECKING:
-    from doorstate.dataset.splits import Role
 
 EMBARGO_M = 0.5
 

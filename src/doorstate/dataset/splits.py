@@ -15,21 +15,19 @@ import warnings
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from doorstate._files import read_csv, write_csv
 from doorstate.dataset.pose_blocks import split_poses
+from doorstate.dataset.roles import ROLES, Role
 from doorstate.errors import DatasetError, unknown_name
 
-Role = Literal["train", "val", "test", "unused"]
 Strata = Sequence[tuple[str, ...]]
 EVERYTHING, UNSEEN = "all", "unseen"
 ONE_FOLD: Mapping[str, Role] = {EVERYTHING: "train", UNSEEN: "test"}
 PROTOCOLS = ("paper", "by-pose", "by-scene", *ONE_FOLD)
-ROLES: tuple[Role, ...] = ("train", "val", "test", "unused")
 NUM_FOLDS = 5
 _TENTHS = 10
 _LEAST_SAMPLES = 3 * _TENTHS

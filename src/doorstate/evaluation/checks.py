@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from doorstate.dataset.splits import Role
+from doorstate.dataset.roles import Role
 from doorstate.errors import RunError
 from doorstate.evaluation.results import PROBABILITY_COLUMNS, Results
 from doorstate.types import NO_DOOR, PREDICTED_LABELS, STATES

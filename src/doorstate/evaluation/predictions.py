@@ -10,7 +10,8 @@ from typing import Any
 import pandas as pd
 from pydantic import ValidationError
 
-from doorstate.dataset.splits import Role, read_splits
+from doorstate.dataset.roles import Role
+from doorstate.dataset.splits import read_splits
 from doorstate.dataset.store import manifest_path
 from doorstate.errors import DatasetError, RunError, first_validation_error
 from doorstate.evaluation import comparison_folder, published

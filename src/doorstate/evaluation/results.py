@@ -13,7 +13,7 @@ from typing import Any
 import pandas as pd
 from pydantic import BaseModel, ConfigDict
 
-from doorstate.dataset.splits import Role
+from doorstate.dataset.roles import Role
 from doorstate.rules.base import Detection
 from doorstate.types import NO_DOOR, STATES
 

@@ -11,7 +11,8 @@ from pydantic import ValidationError
 
 from doorstate._jobs import Progress, default_workers, no_progress, run_pieces
 from doorstate.dataset.loader import check_states
-from doorstate.dataset.splits import Role, draw_splits, read_splits, write_splits
+from doorstate.dataset.roles import Role
+from doorstate.dataset.splits import draw_splits, read_splits, write_splits
 from doorstate.dataset.store import PreparedDataset, open_dataset
 from doorstate.errors import ConfigError, RunError, first_validation_error
 from doorstate.rules import create_rule

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from doorstate.dataset.loader import CloudLoader, FindNeighbours
-from doorstate.dataset.splits import Role
+from doorstate.dataset.roles import Role
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import DatasetError
 from doorstate.types import NO_DOOR

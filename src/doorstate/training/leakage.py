@@ -9,7 +9,8 @@ from typing import Any
 
 from doorstate.dataset.join import check_same_sampling
 from doorstate.dataset.loader import CloudLoader, check_states
-from doorstate.dataset.splits import Role, origin, read_splits
+from doorstate.dataset.roles import Role
+from doorstate.dataset.splits import origin, read_splits
 from doorstate.dataset.store import PreparedDataset, open_dataset
 from doorstate.errors import ConfigError, RunError
 from doorstate.training.experiment import Experiment

@@ -14,7 +14,7 @@ from sklearn.metrics import accuracy_score, f1_score
 
 from doorstate._files import write_csv, write_text
 from doorstate._models import FrozenModel
-from doorstate.dataset.splits import Role
+from doorstate.dataset.roles import Role
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import DatasetError
 from doorstate.rules import create_rule

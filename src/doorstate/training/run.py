@@ -13,7 +13,7 @@ import lightning_fabric
 import torch
 
 from doorstate._memory import keep_freed_memory
-from doorstate.dataset.splits import Role
+from doorstate.dataset.roles import Role
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import ConfigError, WeightsError
 from doorstate.networks import create_network

@@ -10,7 +10,8 @@ from typing import Annotated
 from pydantic import Field
 
 from doorstate.clouds.preparation import MIN_POINTS, NUM_POINTS
-from doorstate.dataset.splits import UNSEEN, Role, origin, read_splits, write_splits
+from doorstate.dataset.roles import Role
+from doorstate.dataset.splits import UNSEEN, origin, read_splits, write_splits
 from doorstate.dataset.store import open_dataset
 from doorstate.errors import ConfigError, RunError
 from doorstate.training.comparison import read_comparison
