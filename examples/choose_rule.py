@@ -25,9 +25,7 @@ from doorstate.types import DoorState
 
 def main(root: Path) -> None:
     """Print a row for each rule."""
-    labelled = [
-        (read_cloud(root / row["file"]), DoorState[row["state"].upper()]) for row in labelled_rows(root)
-    ]
+    labelled = [(read_cloud(root / row["file"]), DoorState(row["state"])) for row in labelled_rows(root)]
     print(f"{len(labelled)} clouds")
     print(f"{'rule':16}{'right':>6}{'wrong':>6}{'unknown':>9}{'ms':>6}  open by mistake: gate, no gate")
     for name in list_rules():

@@ -31,7 +31,7 @@ def main(image: Path, camera: Path) -> None:
     if prediction.state is None:
         print(f"unknown: {prediction.reason}")
     else:
-        print(f"{prediction.state.label}, opened by {prediction.opening_angle_deg:.0f} degrees")
+        print(f"{prediction.state}, opened by {prediction.opening_angle_deg:.0f} degrees")
 
 
 if __name__ == "__main__":

@@ -27,8 +27,8 @@ def main(weights: Path, recording: Path) -> None:
     for path in find_clouds([recording]):
         prediction = predictor(read_cloud(path))
         milliseconds.append(prediction.milliseconds)
-        state = prediction.reason if prediction.state is None else prediction.state.label
-        print(f"{path.name}: {state}{' (late)' if prediction.milliseconds > BUDGET_MS else ''}")
+        late = " (late)" if prediction.milliseconds > BUDGET_MS else ""
+        print(f"{path.name}: {prediction.state or prediction.reason}{late}")
     torch_loaded = "torch" in sys.modules
     print(f"{median(milliseconds):.0f} ms, at most {max(milliseconds):.0f}; torch loaded: {torch_loaded}")
 

@@ -38,7 +38,7 @@ def main(recording: Path) -> int:
         door = state_filter.update(prediction, stamp_s)
         states = (prediction.state, door.state)
         if states != previous:
-            single, filtered = (state.label if state is not None else "unknown" for state in states)
+            single, filtered = (state or "unknown" for state in states)
             print(f"{stamp_s - start_s:4.1f} s  this frame: {single:9}  filtered: {filtered}")
             previous = states
     if wait_for("open", stamped_clouds(recording), timeout_s=30, hold_s=1.0, predictor=predictor):

@@ -65,7 +65,7 @@ def main() -> None:
     weights = run_of(arguments.out / "comparison", arguments.network, 0).weights
     print(f"weights: {weights}")
     first = find_clouds([arguments.clouds])[0]
-    print(f"{first.name}: {Predictor.load(weights)(read_cloud(first, options)).state!r}")
+    print(f"{first.name}: {Predictor.load(weights)(read_cloud(first, options)).label}")
 
 
 if __name__ == "__main__":  # the preparation starts processes that import this file

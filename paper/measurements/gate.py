@@ -13,7 +13,6 @@ from doorstate._jobs import Progress
 from doorstate.clouds.measured import is_measured
 from doorstate.evaluation.table import Table
 from doorstate.inference.network_predictor import NetworkPredictor
-from doorstate.inference.predictor import Predictor
 from doorstate.simulation.frames import Frame, replay
 from doorstate.simulation.row import Row
 from doorstate.types import Part, Points
@@ -92,7 +91,7 @@ def measure_gate(network: str, count: int, progress: Progress) -> list[GateResul
         for fault_name, fault in FAULTS.items():
             cloud = fault(row, frame, np.random.default_rng(number))
             flat = cloud[is_measured(cloud)]
-            states = (_state(gated, cloud), _state(gated, flat), _state(ungated, cloud))
+            states = (gated(cloud).state, gated(flat).state, ungated(cloud).state)
             results.append(GateResult(row.sample_id, row.state, fault_name, *states))
     return results
 
@@ -129,8 +128,3 @@ def gate_table(results: Sequence[GateResult]) -> Table:
         "Packaged weights on simulated doors that they were not trained on, each with every fault; as an organized "
         "cloud, and as a flat list of the measured points.",
     )
-
-
-def _state(predictor: Predictor, cloud: Points) -> str | None:
-    state = predictor(cloud).state
-    return None if state is None else state.label

@@ -44,8 +44,8 @@ def thinning_table(results: Sequence[ThinningResult]) -> Table:
     row = (
         str(len(results)),
         str(sum(result.thinned.state == result.full.state for result in results)),
-        str(sum(_label(result.thinned) == result.state for result in results)),
-        str(sum(_label(result.full) == result.state for result in results)),
+        str(sum(result.thinned.state == result.state for result in results)),
+        str(sum(result.full.state == result.state for result in results)),
         number(float(np.median(differences))),
         number(max(differences)),
     )
@@ -56,7 +56,3 @@ def thinning_table(results: Sequence[ThinningResult]) -> Table:
         "Packaged weights on simulated doors that they were not trained on; differences are those of the probability "
         "that differs most.",
     )
-
-
-def _label(prediction: Prediction) -> str | None:
-    return None if prediction.state is None else prediction.state.label

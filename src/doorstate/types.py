@@ -7,8 +7,8 @@ metres.
 
 from __future__ import annotations
 
-from enum import IntEnum
-from typing import Final
+from enum import IntEnum, StrEnum
+from typing import Final, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,20 +18,36 @@ DepthImage = NDArray[np.float32]  # (H, W) z-depth in metres, NaN where nothing 
 Indices = NDArray[np.int64]
 
 
-class DoorState(IntEnum):
-    """State of a door; the value is the class label of every network."""
+class DoorState(StrEnum):
+    """State of a door; prints, compares and serialises as its name. Spellings such as `Semi-Open` are taken too."""
 
-    CLOSED = 0
-    SEMI_OPEN = 1
-    OPEN = 2
+    CLOSED = "closed"
+    SEMI_OPEN = "semi_open"
+    OPEN = "open"
 
     @property
-    def label(self) -> str:
-        """Name in files: `closed`, `semi_open` or `open`."""
-        return self.name.lower()
+    def class_index(self) -> int:
+        """Class of every network: 0 closed, 1 semi_open, 2 open."""
+        return STATES.index(self.value)
+
+    @classmethod
+    def from_index(cls, index: int) -> DoorState:
+        """Return the state of a class.
+
+        Raises:
+            ValueError: no such class.
+        """
+        if not 0 <= index < len(STATES):
+            raise ValueError(f"no class {index}: there are {len(STATES)}")
+        return cls(STATES[index])
+
+    @classmethod
+    def _missing_(cls, value: object) -> Self | None:
+        name = value.strip().lower().replace("-", "_").replace(" ", "_") if isinstance(value, str) else None
+        return next((state for state in cls if state.value == name), None)
 
 
-STATES: tuple[str, ...] = tuple(state.label for state in DoorState)
+STATES: tuple[str, ...] = tuple(state.value for state in DoorState)
 NO_DOOR: Final = "no_door"  # label of a scene without a door; not a class of the networks
 DOOR, PARTS = "door", "parts"  # names of heads that several packages use
 DECISION_THRESHOLD = 0.5  # a probability of at least this is a yes

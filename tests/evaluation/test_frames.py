@@ -82,7 +82,7 @@ def test_progress_counts_files(predictors: Predictors, labelled: list[LabelledFr
 def test_scores_count_the_predictions(results: FrameResults) -> None:
     scores = results.score("door", ["light", "door:glass"])
     correct = sum(
-        prediction.state is not None and prediction.state.label == frame.label
+        prediction.state == frame.label
         for frame, prediction in zip(results.frames, results.outputs["plane_state"], strict=True)
     )
     by_method = scores.scores.set_index("method")

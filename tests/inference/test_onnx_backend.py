@@ -160,7 +160,7 @@ def test_the_documented_python_runs_without_torch(
     shutil.copy(sorted((simulated_folder / "pcd" / "open").glob("*.pcd"))[0], tmp_path / "cloud.pcd")
     done = run_without_torch(example, tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
-    assert re.match(r"<DoorState\.\w+: \d> \{'closed': ", done.stdout)
+    assert re.match(r"\w+ \{'closed': ", done.stdout)
 
 
 def test_predict_runs_without_torch(

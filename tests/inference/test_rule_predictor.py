@@ -27,9 +27,7 @@ def test_the_prediction_is_the_result_of_the_rule(name: str) -> None:
         result.opening_angle_deg,
     )
     assert prediction.num_points == 320 * 240
-    assert prediction.probabilities == {
-        state: float(result.state is not None and state == result.state.label) for state in STATES
-    }
+    assert prediction.probabilities == {state: float(state == result.state) for state in STATES}
 
 
 @pytest.mark.parametrize("name", list_rules())

@@ -44,11 +44,11 @@ def test_probabilities_sum_to_one_and_a_state_has_evidence(steps: list[tuple[flo
         assert math.isclose(sum(now.probabilities.values()), 1.0, rel_tol=1e-9)
         assert min(now.probabilities.values()) > 0
         if now.state is not None:
-            assert now.probabilities[now.state.label] >= 0.5
+            assert now.probabilities[now.state] >= 0.5
         changed = before is None or now.state != before.state
         assert now.since_s == (stamp_s if changed else before.since_s)
         if changed and now.state is not None:
-            assert now.probabilities[now.state.label] >= 0.8
+            assert now.probabilities[now.state] >= 0.8
             assert frame.state is not None  # a frame without a state brings none
         before = now
 
@@ -94,7 +94,7 @@ def test_the_posterior_equals_the_explicit_markov_chain() -> None:
     belief = np.full(3, 1 / 3)
     for state in (OPEN, OPEN, CLOSED):
         evidence = np.full(3, 0.05)
-        evidence[state] = 0.9
+        evidence[state.class_index] = 0.9
         belief = (transition.T @ belief) * np.sqrt(0.94 * evidence + 0.02)
         belief /= belief.sum()
     first = (0.0, UNKNOWN)

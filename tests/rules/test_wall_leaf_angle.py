@@ -204,5 +204,5 @@ def test_states_of_doors_rendered_by_gazebo() -> None:
     for frame, depth in zip(frames, depths, strict=True):
         camera = CAMERAS["xtion-gazebo"].intrinsics()
         result = WallLeafAngleRule()(level(depth_to_points(depth, camera), frame["camera"]["pitch"]))
-        correct += result.state is not None and frame["name"].endswith(f"_{result.state.label}")
+        correct += result.state is not None and frame["name"].endswith(f"_{result.state}")
     assert correct >= 19

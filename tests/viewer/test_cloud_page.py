@@ -39,7 +39,7 @@ def test_entry_holds_the_input_points_of_the_network(
     prediction = predictor(clouds[1].cloud)  # type: ignore[arg-type]
     values = entries[1]["prediction"]
     assert values["probabilities"] == pytest.approx(prediction.probabilities, abs=1e-6)
-    assert (values["state"], values["points"]) == (prediction.state.label, 300)  # type: ignore[union-attr]
+    assert (values["state"], values["points"]) == (prediction.state, 300)  # type: ignore[union-attr]
     assert entries[1]["truth"] == "semi_open"
 
 

@@ -39,7 +39,7 @@ def label_of_folder(name: str) -> str | None:
     """Return the label in a folder's name: a state, `no_door` (`none`, `no door`, `without_doors`), or None."""
     state = state_of_folder(name)
     if state is not None:
-        return state.label
+        return str(state)
     return NO_DOOR if _NO_DOOR.fullmatch(re.sub(r"[^a-z]", "", name.lower())) else None
 
 
@@ -80,7 +80,7 @@ def labelled_rows(root: Path, poses_csv: Path | None = None) -> list[dict[str, s
         state = nearest_label(root, path, state_of_folder)
         if state is None:
             continue
-        row = file_row(root, path, state.label)
+        row = file_row(root, path, state)
         relative = path.relative_to(root)
         key = next((name for name in (relative.as_posix(), relative.name) if name in poses), None)
         if key:

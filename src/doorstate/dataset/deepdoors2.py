@@ -61,7 +61,7 @@ def deepdoors2_rows(root: Path) -> list[dict[str, str]]:
         if kind != "depth" or "cropped" in folders or "(" in path.name or state is None:
             continue
         split = next((name for name in reversed(folders) if name in _SPLITS), "")
-        rows.append(file_row(root, path, state.label) | {"split": split})
+        rows.append(file_row(root, path, state) | {"split": split})
     if not rows:
         raise DatasetError(
             "no depth images of DeepDoors2", path=root, expected="folders such as Depth/Test/Closed"

@@ -21,7 +21,7 @@ from doorstate.clouds.normalization import centroids, normalize
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import ConfigError
 from doorstate.networks.heads import IGNORE_INDEX, POINT_HEADS, augment_targets, head_targets
-from doorstate.types import DOOR, PARTS, DoorState
+from doorstate.types import DOOR, PARTS, STATES
 
 FindNeighbours = Callable[[Tensor], tuple[Tensor, ...]]
 """From (B, n, 3) points to (B, ...) int64 indices into them."""
@@ -40,7 +40,7 @@ def check_states(dataset: PreparedDataset, sample_ids: Sequence[str], heads: Seq
     """Raise ConfigError if samples show no door and no head predicts the presence of a door."""
     if DOOR in heads:
         return
-    without = [sample for sample in sample_ids if dataset.labels[dataset.index_of(sample)] >= len(DoorState)]
+    without = [sample for sample in sample_ids if dataset.labels[dataset.index_of(sample)] >= len(STATES)]
     if without:
         raise ConfigError(
             f"{len(without)} samples show no door, such as {without[0]}",
@@ -165,7 +165,7 @@ def _load(
     points = dataset.clouds[indices, :num_points]
     centroids_m = centroids(points)
     check_states(dataset, sample_ids, heads)
-    labels = np.where(dataset.labels[indices] < len(DoorState), dataset.labels[indices], IGNORE_INDEX)
+    labels = np.where(dataset.labels[indices] < len(STATES), dataset.labels[indices], IGNORE_INDEX)
     targets = head_targets([dataset.rows[index] for index in indices], centroids_m, heads)
     parts = dataset.parts_of(indices, num_points) if PARTS in heads else None
     return _Loaded(normalize(points), centroids_m, labels, targets, parts)

@@ -105,7 +105,7 @@ class PreparedDataset:
 
     @cached_property
     def labels(self) -> NDArray[np.int64]:
-        """Class labels (M,), values of doorstate.types.DoorState; 3 for a scene without a door."""
+        """Class labels (M,), `DoorState.class_index`; 3 for a scene without a door."""
         return np.array([_LABELS.index(row["state"]) for row in self.rows], dtype=np.int64)
 
     @property

@@ -40,7 +40,7 @@ class FrameResults:
                 "method": method,
                 "sample_id": frame.file,
                 "state": frame.label,
-                "predicted": ABSTAINED if prediction.state is None else prediction.state.label,
+                "predicted": prediction.label,
                 **{f"p_{state}": prediction.probabilities[state] for state in STATES},
                 "p_door": _number(prediction.door_probability),
                 "opening_angle_deg": _number(prediction.opening_angle_deg),

@@ -24,7 +24,7 @@ def decode(outputs: CloudOutputs, abstain_below: float, num_points: int, millise
     heads = outputs.heads
     abstention = _abstention(outputs, abstain_below)
     return Prediction(
-        state=None if abstention else DoorState(int(outputs.probabilities.argmax())),
+        state=None if abstention else DoorState.from_index(int(outputs.probabilities.argmax())),
         probabilities={state: float(p) for state, p in zip(STATES, outputs.probabilities, strict=True)},
         num_points=num_points,
         milliseconds=milliseconds,
@@ -46,7 +46,7 @@ def _abstention(outputs: CloudOutputs, abstain_below: float) -> Abstention | Non
     probability = float(outputs.probabilities[likeliest])
     if probability < abstain_below:
         values: dict[str, float | str] = {
-            "state": DoorState(likeliest).label,
+            "state": STATES[likeliest],
             "probability": probability,
             "min_probability": abstain_below,
         }

@@ -32,7 +32,7 @@ class DoorReport:
     @property
     def state(self) -> str:
         """Name of the filter's state, or `unknown`."""
-        return UNKNOWN if self.filtered.state is None else self.filtered.state.label
+        return str(self.filtered.state or UNKNOWN)
 
     @property
     def values(self) -> dict[str, str]:
@@ -48,5 +48,5 @@ class DoorReport:
     def text(self) -> str:
         """Label to draw beside the door: the state, and the reason under it if this message has none."""
         state = self.filtered.state
-        probability = "" if state is None else f" {self.filtered.probabilities[state.label]:.0%}"
+        probability = "" if state is None else f" {self.filtered.probabilities[state]:.0%}"
         return f"{self.state}{probability}\n{self.prediction.reason}".strip()

@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 
 from doorstate.inference.abstention import Abstention
 from doorstate.rules.base import Detection
-from doorstate.types import STATES, DoorState
+from doorstate.types import ABSTAINED, STATES, DoorState
 
 
 class DoorFrame(NamedTuple):
@@ -41,6 +41,11 @@ class Prediction:
     opening_width_m: float | None = None
     passable_width_m: float | None = None  # between leaf and jamb
     detections: tuple[Detection, ...] = field(default=(), compare=False, repr=False)  # of a rule
+
+    @property
+    def label(self) -> str:
+        """Name of the state, or `abstained`."""
+        return str(self.state or ABSTAINED)
 
     @property
     def reason(self) -> str:

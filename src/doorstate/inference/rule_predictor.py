@@ -68,9 +68,7 @@ class RulePredictor(Predictor):
         result = self.rule(np.asarray(cloud))
         return Prediction(
             state=result.state,
-            probabilities={
-                state: float(result.state is not None and result.state.label == state) for state in STATES
-            },
+            probabilities={state: float(result.state == state) for state in STATES},
             num_points=num_points,
             milliseconds=_milliseconds_since(started),
             abstention=Abstention("no_rule_result", message=result.reason) if result.state is None else None,

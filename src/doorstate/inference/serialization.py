@@ -22,7 +22,7 @@ def prediction_to_dict(
         parameter: writes a parameter that a reason suggests as the surface spells it.
     """
     record: dict[str, Any] = {
-        "state": None if prediction.state is None else prediction.state.label,
+        "state": None if prediction.state is None else str(prediction.state),
         "probabilities": {state: round(p, 6) for state, p in prediction.probabilities.items()},
         "points": prediction.num_points,
         "milliseconds": round(prediction.milliseconds, 3),

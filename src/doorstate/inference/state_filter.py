@@ -124,7 +124,7 @@ class StateFilter:
     def _next_state(self) -> DoorState | None:
         likeliest = int(self._belief.argmax())
         if self._belief[likeliest] >= self._enter_probability:
-            return DoorState(likeliest)
-        if self._state is not None and self._belief[self._state] < self._leave_probability:
+            return DoorState.from_index(likeliest)
+        if self._state is not None and self._belief[self._state.class_index] < self._leave_probability:
             return None
         return self._state

@@ -97,8 +97,7 @@ def wait_for(
 
 
 def _parse_state(state: DoorState | str) -> DoorState:
-    if isinstance(state, DoorState):
-        return state
-    if state not in STATES:
-        raise unknown_name("state", state, STATES, field="state")
-    return DoorState[state.upper()]
+    try:
+        return DoorState(state)
+    except ValueError as error:
+        raise unknown_name("state", state, STATES, field="state") from error

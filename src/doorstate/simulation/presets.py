@@ -120,8 +120,8 @@ def draw_rows(preset: Preset, seed: int, index: int) -> list[Row]:
 def _door_columns(pose_id: str, door: Door, opening: Opening, name: str | None) -> dict[str, object]:
     state, ambiguous = state_of(door, opening)
     return {
-        "sample_id": f"{pose_id}-{name or state.label}",
-        "state": state.label,
+        "sample_id": f"{pose_id}-{name or state}",
+        "state": str(state),
         "ambiguous": ambiguous,
         "door_kind": door.kind,
         "hinge": "" if door.is_sliding else door.hinge,

@@ -114,7 +114,7 @@ def _scores(rows: Sequence[Mapping[str, str]]) -> dict[str, float]:
 
 
 def _prediction_row(sample: str, state: str, result: RuleResult) -> dict[str, str]:
-    predicted = ABSTAINED if result.state is None else result.state.label
+    predicted = ABSTAINED if result.state is None else str(result.state)
     return {
         "sample_id": sample,
         "state": state,

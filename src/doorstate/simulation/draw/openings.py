@@ -43,7 +43,7 @@ def state_of(door: Door, opening: Opening) -> tuple[DoorState, bool]:
     value, ranges = (opening.share, SHARES) if door.is_sliding else (opening.angle_deg, ANGLES_DEG)
     gap = {state: max(low - value, value - high, 0.0) for state, (low, high) in ranges.items()}
     # Beyond the range of open a door is wide open, which is not ambiguous.
-    state = min(gap, key=lambda candidate: (gap[candidate], candidate))
+    state = min(gap, key=gap.__getitem__)
     return state, gap[state] > 0 and not (state is DoorState.OPEN and value > ranges[state][1])
 
 

@@ -39,7 +39,7 @@ def draw_paper_scene(
     openings = []
     for state in DoorState:
         # From 1: numpy pads short seeds with zeros, so 0 would repeat the number drawn for the heading.
-        rng = np.random.default_rng([seed, index, 1 + int(state)])
+        rng = np.random.default_rng([seed, index, 1 + state.class_index])
         openings.append(Opening(angle_deg=float(rng.uniform(*angles_deg[state]))))
     viewpoint = Viewpoint.on_lattice(half_ring()[index], draw_heading_offset_deg(seed, index))
     return DrawnScene(Scene(door=door, has_ceiling=False), viewpoint, openings)
