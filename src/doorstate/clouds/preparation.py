@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from doorstate._models import FrozenModel
-from doorstate.clouds.measured import MAX_COORDINATE, is_measured
+from doorstate.clouds.measured import is_measured
 from doorstate.clouds.sampling import farthest_point_indices
 from doorstate.clouds.shape import check_shape
 from doorstate.clouds.units import check_units, median_range_m
 from doorstate.errors import TooFewPointsError
+from doorstate.io.size_limits import MAX_COORDINATE
 from doorstate.types import Indices, Points
 
 NUM_POINTS = 4096  # as in the paper

@@ -3,16 +3,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
-from doorstate.clouds.measured import is_measured
+from doorstate.clouds.measured import quiet_nans
 from doorstate.errors import CloudContentError
+from doorstate.io.organized import is_image
 from doorstate.types import Points
-
-_MAX_LINES, _MAX_PLACES, _MIN_PAIRS = 8, 32, 12  # sampled to recognize an image
 
 
 def check_shape(points: Points) -> Points:
@@ -30,8 +26,10 @@ def check_shape(points: Points) -> Points:
             expected="numbers of shape (N, 3) or (H, W, 3)",
             hint="keep x, y and z only" if has_more_values else None,
         )
-    # Limits of coordinates, and squares of coordinates, exceed the range of float16.
-    return cloud.astype(np.float32) if cloud.dtype == np.float16 else cloud
+    if cloud.dtype == np.float16:  # limits of coordinates, and squares of coordinates, exceed its range
+        with np.errstate(invalid="ignore"):
+            cloud = cloud.astype(np.float32)
+    return quiet_nans(cloud)
 
 
 def check_single_cloud(points: Points) -> Points:
@@ -49,31 +47,3 @@ def check_single_cloud(points: Points) -> Points:
             hint="give several clouds one by one, and points without an order as (N, 3)",
         )
     return cloud
-
-
-def is_image(cloud: NDArray[Any]) -> bool:
-    """Return True if points (H, W, 3) come from the pixels of a camera.
-
-    Rays of neighbouring pixels are closer than rays half an image apart, in rows and in columns. Stacked clouds are
-    alike down the columns, or unlike along the rows. Too few measured points count as an image.
-    """
-    return all(_is_scanned(lines) for lines in (cloud, np.swapaxes(cloud, 0, 1)))
-
-
-def _is_scanned(lines: NDArray[Any]) -> bool:
-    """Return True if neighbours in a line are closer than points half a line apart."""
-    sampled = lines[:: max(1, len(lines) // _MAX_LINES)]
-    length = sampled.shape[1]
-    places = np.arange(0, length, max(1, length // _MAX_PLACES))
-
-    def median_angle(step: int) -> float:
-        """Return the median of 1 - cos of the angle between points `step` places apart."""
-        start, end = (sampled[:, (places + offset) % length].astype(np.float64) for offset in (0, step))
-        measured = is_measured(start) & is_measured(end)
-        start, end = start[measured], end[measured]
-        if len(start) < _MIN_PAIRS:
-            return np.nan
-        lengths = np.linalg.norm(start, axis=1) * np.linalg.norm(end, axis=1)
-        return max(0.0, float(np.median(1 - (start * end).sum(axis=1) / lengths)))
-
-    return not median_angle(1) >= 0.5 * median_angle(length // 2)  # False for NaN

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from doorstate.clouds.preparation import MIN_POINTS, CloudSpec, PreparedCloud, prepare_cloud
-from doorstate.clouds.shape import check_single_cloud, is_image
+from doorstate.clouds.shape import check_single_cloud
 from doorstate.errors import CloudContentError, ConfigError, TooFewPointsError
 from doorstate.inference.abstention import Abstention
 from doorstate.inference.backends import Backend, load_backend, run_by_size
@@ -20,6 +20,7 @@ from doorstate.inference.decode import decode
 from doorstate.inference.gate import DEFAULT_GATE, Gate
 from doorstate.inference.prediction import Prediction
 from doorstate.inference.predictor import DEFAULT_NETWORK, Predictor
+from doorstate.io.organized import is_image
 from doorstate.types import Points
 
 _NO_POINTS = np.empty((0, 3), np.float32)

@@ -13,12 +13,10 @@ from numpy.lib import format as npy_format
 from numpy.typing import NDArray
 
 from doorstate.errors import CloudReadError
-from doorstate.io.size_limits import MAX_POINTS, check_size
+from doorstate.io.size_limits import MAX_FILE_BYTES, check_size
 
 # Names of the array to read in an archive, in order of preference.
 ARRAY_NAMES = ("points", "cloud", "xyz", "depth")
-# Four float64 for every point: an archive member that unpacks to more is a zip bomb.
-_MAX_MEMBER_BYTES = 32 * MAX_POINTS
 
 
 def parse_npy(data: bytes) -> NDArray[Any]:
@@ -53,7 +51,7 @@ def parse_npz(data: bytes) -> NDArray[Any]:
         if name is None:
             held = ", ".join(members) or "no arrays"
             raise CloudReadError(f"holds {held}", expected=f"an array named {' or '.join(ARRAY_NAMES)}")
-        if members[name].file_size > _MAX_MEMBER_BYTES:
+        if members[name].file_size > MAX_FILE_BYTES:
             raise CloudReadError(
                 f"array {name} unpacks to {members[name].file_size} bytes: not one camera frame"
             )

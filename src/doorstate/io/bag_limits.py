@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from doorstate.io.plain_yaml import plain_documents
-from doorstate.io.size_limits import MAX_POINTS
+from doorstate.io.size_limits import MAX_FILE_BYTES
 
-MAX_UNPACKED = 32 * MAX_POINTS  # bytes of a message or of a chunk of messages
+MAX_UNPACKED = MAX_FILE_BYTES  # bytes of a message or of a chunk of messages
 
 
 def unpack_zstd(packed: bytes) -> bytes:

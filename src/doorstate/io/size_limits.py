@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks of declared sizes, before anything of that size is allocated."""
+"""Limits of clouds and of the files that hold them, checked before anything of that size is read or allocated."""
 
 from __future__ import annotations
 
@@ -7,6 +7,9 @@ from doorstate.errors import CloudReadError
 
 # The largest depth cameras have 8 megapixels. A small file can unpack to far more.
 MAX_POINTS = 1 << 23
+# Four float64 for every point, or 32 characters; files of ordinary cameras hold a hundredth.
+MAX_FILE_BYTES = 32 * MAX_POINTS
+MAX_COORDINATE = 1e6  # in any unit; some drivers write FLT_MAX where nothing was measured
 
 
 def check_size(declared: int, present: int, unit: str) -> None:
@@ -29,3 +32,15 @@ def check_point_count(count: int) -> None:
     """
     if count > MAX_POINTS:
         raise CloudReadError(f"holds {count} points: not one camera frame", expected=f"at most {MAX_POINTS}")
+
+
+def check_byte_count(count: int) -> None:
+    """Check that one camera frame can have this number of bytes.
+
+    Raises:
+        CloudReadError: there are more.
+    """
+    if count > MAX_FILE_BYTES:
+        raise CloudReadError(
+            f"holds {count} bytes: not one camera frame", expected=f"at most {MAX_FILE_BYTES}"
+        )
