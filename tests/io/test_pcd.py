@@ -16,6 +16,8 @@ from pypcd4.pypcd4 import Encoding, PointCloud
 
 from doorstate.errors import CloudContentError, CloudReadError
 from doorstate.io.pcd import parse_pcd, write_pcd
+from doorstate.io.pcd_header import IDENTITY, read_pcd_header
+from tests.hand_made_clouds import image_of_a_rough_wall
 
 NAN = np.nan
 POINTS = np.array([[1.5, -2.25, 3.125], [NAN, NAN, NAN], [0.5, 0.25, -8.0]], np.float32)
@@ -94,6 +96,11 @@ def test_other_shapes_are_not_written(tmp_path: Path, shape: tuple[int, ...]) ->
         HEADER + ROWS,
         HEADER + ROWS.replace(" ", "  ").replace("\n", " \n"),
         (HEADER + ROWS).replace("\n", "\r\n"),
+        (HEADER + ROWS).replace("\n", "\r"),
+        HEADER.replace("FIELDS", "COLUMNS") + ROWS,
+        HEADER.replace("SIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\n", "") + ROWS,
+        HEADER.replace("x y z", "_ x y z").replace("4 4 4", "1 4 4 4").replace("F F F", "U F F F")
+        .replace("1 1 1", "0 1 1 1") + ROWS,
         HEADER.replace("0.7", ".5").replace("COUNT 1 1 1\n", "") + ROWS,
         HEADER.replace("POINTS 3\n", "").replace("VIEWPOINT 0 0 0 1 0 0 0\n", "") + ROWS,
         HEADER + ROWS + "7 8 9\n",
@@ -103,7 +110,8 @@ def test_other_shapes_are_not_written(tmp_path: Path, shape: tuple[int, ...]) ->
         HEADER.replace("x y z", "h x y z").replace("4 4 4", "4 4 4 4").replace("F F F", "F F F F")
         .replace("1 1 1", "2 1 1 1") + "".join("9 9 " + row + "\n" for row in ROWS.splitlines()),
     ],
-    ids=["plain", "blanks", "crlf", "version 0.5", "no POINTS", "rows to spare", "float label", "histogram"],
+    ids=["plain", "blanks", "crlf", "cr", "columns", "no sizes", "count 0", "version 0.5", "no POINTS",
+         "rows to spare", "float label", "histogram"],
 )  # fmt: skip
 def test_ascii_variants(text: str) -> None:
     np.testing.assert_array_equal(parse_pcd(text.encode()), POINTS)
@@ -117,6 +125,57 @@ def test_padding_and_repeated_fields_in_binary() -> None:
     rows = np.zeros(3, [("a", "u1", 3), ("xyz", "<f4", 3), ("b", "u1", 2), ("c", "<f4")])
     rows["xyz"] = POINTS
     np.testing.assert_array_equal(parse_pcd(header.encode() + rows.tobytes()), POINTS)
+
+
+@pytest.mark.parametrize("end", ["\r", "\n", "\r\n"])
+def test_any_line_end_before_binary_points(end: str) -> None:
+    # Points that begin with the byte of a line end.
+    points = np.array([[10, 13, 10], [1, 2, 3], [4, 5, 6]], "u1")
+    header = HEADER.replace("4 4 4", "1 1 1").replace("F F F", "U U U").replace("ascii", "binary")
+    header = header.replace("SIZE", "# sizes in bytes\nSIZE").replace("\n", end)
+    np.testing.assert_array_equal(parse_pcd(header.encode() + points.tobytes()), points)
+
+
+def test_fields_with_count_0_take_no_bytes() -> None:
+    header = HEADER.replace("x y z", "x y z _ intensity").replace("4 4 4", "4 4 4 1 4")
+    header = header.replace("F F F", "F F F U F").replace("COUNT 1 1 1", "COUNT 1 1 1 0 1")
+    rows = np.hstack([POINTS, np.ones((3, 1), np.float32)])
+    data = header.replace("ascii", "binary").encode() + rows.tobytes()
+    np.testing.assert_array_equal(parse_pcd(data), POINTS)
+
+
+def test_shuffled_points_of_an_organized_header_are_unorganized(tmp_path: Path) -> None:
+    wall = image_of_a_rough_wall(60, 80)
+    write_pcd(tmp_path / "wall.pcd", wall)
+    np.testing.assert_array_equal(parse_pcd((tmp_path / "wall.pcd").read_bytes()), wall)
+    shuffled = np.random.default_rng(0).permutation(wall.reshape(-1, 3))
+    write_pcd(tmp_path / "shuffled.pcd", shuffled.reshape(60, 80, 3))
+    np.testing.assert_array_equal(parse_pcd((tmp_path / "shuffled.pcd").read_bytes()), shuffled)
+
+
+def test_the_viewpoint_is_read_from_the_header() -> None:
+    moved = HEADER.replace("VIEWPOINT 0 0 0 1 0 0 0", "VIEWPOINT 1 -2.5 3e0 0.5 0.5 0.5 0.5")
+    assert read_pcd_header(moved.encode()).viewpoint == (1, -2.5, 3, 0.5, 0.5, 0.5, 0.5)
+    assert read_pcd_header(HEADER.replace("VIEWPOINT", "# ").encode()).viewpoint == IDENTITY
+
+
+@pytest.mark.parametrize(
+    ("line", "changed", "field"),
+    [
+        ("VIEWPOINT 0 0 0 1 0 0 0", "VIEWPOINT 0 0 0 1", "VIEWPOINT"),
+        ("VIEWPOINT 0 0 0 1 0 0 0", "VIEWPOINT 0 0 0 1 0 0 nan", "VIEWPOINT"),
+        ("POINTS 3", "POINTS " + "9" * 5000, "POINTS"),
+        ("POINTS 3", "POINTS -3", "POINTS"),
+        ("SIZE 4 4 4", "SIZE 4 2 4", "y"),
+        ("TYPE F F F", "TYPE F F D", "z"),
+        ("COUNT 1 1 1", "COUNT 3 1 1", "x"),
+        ("COUNT 1 1 1", "COUNT 1 1 0", "z"),
+    ],
+)
+def test_errors_name_the_entry_of_the_header(line: str, changed: str, field: str) -> None:
+    with pytest.raises(CloudReadError) as caught:
+        parse_pcd((HEADER.replace(line, changed) + ROWS).encode())
+    assert caught.value.field == field
 
 
 def test_no_points_are_no_rows() -> None:

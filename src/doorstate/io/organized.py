@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from doorstate.io.size_limits import MAX_COORDINATE
 
 _MAX_LINES, _MAX_PLACES, _MIN_PAIRS = 8, 32, 12  # sampled to recognize an image
+_MIN_SIDE = 16  # of a camera, or rings of a scanner; the order of fewer rows is not doubted
 
 
 def is_image(cloud: NDArray[Any]) -> bool:
@@ -24,7 +25,8 @@ def is_image(cloud: NDArray[Any]) -> bool:
 
 def flatten_unless_image(cloud: NDArray[Any]) -> NDArray[Any]:
     """Return points (H, W, 3) as they are, or as (H * W, 3) if they have been shuffled since they were measured."""
-    return cloud if is_image(cloud) else cloud.reshape(-1, 3)
+    is_too_small = min(cloud.shape[:2]) < _MIN_SIDE
+    return cloud if is_too_small or is_image(cloud) else cloud.reshape(-1, 3)
 
 
 def _is_scanned(lines: NDArray[Any]) -> bool:
