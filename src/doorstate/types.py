@@ -17,6 +17,8 @@ Points = NDArray[np.float32]  # (N, 3) metres
 DepthImage = NDArray[np.float32]  # (H, W) z-depth in metres, NaN where nothing was measured
 Indices = NDArray[np.int64]
 
+MAX_COORDINATE: Final = 1e6  # of a point, in any unit; some drivers write FLT_MAX where nothing was measured
+
 
 class DoorState(StrEnum):
     """State of a door; prints, compares and serialises as its name. Spellings such as `Semi-Open` are taken too."""

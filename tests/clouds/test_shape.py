@@ -6,10 +6,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from doorstate._organized import is_image
 from doorstate.clouds.preparation import CloudSpec, prepare_cloud
 from doorstate.clouds.shape import check_shape, check_single_cloud
 from doorstate.errors import CloudContentError
-from doorstate.io.organized import is_image
 from doorstate.types import Points
 from tests.hand_made_clouds import image_of_a_rough_wall
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from doorstate.io.size_limits import MAX_COORDINATE
+from doorstate.types import MAX_COORDINATE
 
 
 def is_measured(points: NDArray[np.floating[Any]]) -> NDArray[np.bool_]:

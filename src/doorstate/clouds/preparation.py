@@ -14,8 +14,7 @@ from doorstate.clouds.sampling import farthest_point_indices
 from doorstate.clouds.shape import check_shape
 from doorstate.clouds.units import check_units, median_range_m
 from doorstate.errors import TooFewPointsError
-from doorstate.io.size_limits import MAX_COORDINATE
-from doorstate.types import Indices, Points
+from doorstate.types import MAX_COORDINATE, Indices, Points
 
 NUM_POINTS = 4096  # as in the paper
 MIN_POINTS = 128  # fewer cannot fill the largest neighbourhood of a network

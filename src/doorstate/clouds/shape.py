@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from doorstate._organized import is_image
 from doorstate.clouds.measured import quiet_nans
 from doorstate.errors import CloudContentError
-from doorstate.io.organized import is_image
 from doorstate.types import Points
 
 

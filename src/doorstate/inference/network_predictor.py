@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from doorstate._organized import is_image
 from doorstate.clouds.preparation import MIN_POINTS, CloudSpec, PreparedCloud, prepare_cloud
 from doorstate.clouds.shape import check_single_cloud
 from doorstate.errors import CloudContentError, ConfigError, TooFewPointsError
@@ -20,7 +21,6 @@ from doorstate.inference.decode import decode
 from doorstate.inference.gate import DEFAULT_GATE, Gate
 from doorstate.inference.prediction import Prediction
 from doorstate.inference.predictor import DEFAULT_NETWORK, Predictor
-from doorstate.io.organized import is_image
 from doorstate.types import Points
 
 _NO_POINTS = np.empty((0, 3), np.float32)

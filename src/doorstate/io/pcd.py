@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from pypcd4.pypcd4 import Encoding, MetaData, PointCloud
 
 from doorstate._files import atomic_path
+from doorstate._organized import flatten_unless_image
 from doorstate.errors import CloudContentError, CloudReadError
-from doorstate.io.organized import flatten_unless_image
 from doorstate.io.pcd_header import PcdHeader, read_pcd_header
 from doorstate.io.size_limits import check_point_count, check_size
 from doorstate.io.text import parse_rows

@@ -9,7 +9,6 @@ from doorstate.errors import CloudReadError
 MAX_POINTS = 1 << 23
 # Four float64 for every point, or 32 characters; files of ordinary cameras hold a hundredth.
 MAX_FILE_BYTES = 32 * MAX_POINTS
-MAX_COORDINATE = 1e6  # in any unit; some drivers write FLT_MAX where nothing was measured
 
 
 def check_size(declared: int, present: int, unit: str) -> None:

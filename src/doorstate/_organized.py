@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from doorstate.io.size_limits import MAX_COORDINATE
+from doorstate.types import MAX_COORDINATE
 
 _MAX_LINES, _MAX_PLACES, _MIN_PAIRS = 8, 32, 12  # sampled to recognize an image
 _MIN_SIDE = 16  # of a camera, or rings of a scanner; the order of fewer rows is not doubted
