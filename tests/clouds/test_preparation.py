@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from doorstate.clouds.preparation import MIN_POINTS, CloudSpec, prepare_cloud
+from doorstate.clouds.samplers import NUMPY
 from doorstate.clouds.sampling import farthest_point_indices
 from doorstate.errors import CloudContentError, TooFewPointsError
 from doorstate.types import Points
@@ -139,3 +140,19 @@ def test_the_error_of_a_far_cloud_has_its_distance() -> None:
     far = cloud(500) + np.array([20, 0, 0], np.float32)
     with pytest.raises(CloudContentError, match=r"0 within 5 m ahead, .* 2\d\.\d m away"):
         prepare_cloud(far, CloudSpec(num_points=200, max_depth_m=5))
+
+
+def test_flat_clouds_are_thinned_too() -> None:
+    flat = cloud(20_000)
+    flat[::7] = NAN
+    points, indices = prepare_cloud(flat, CloudSpec(num_points=200, thin=True))
+    np.testing.assert_array_equal(points, flat[indices])
+    few = prepare_cloud(flat[:1800], CloudSpec(num_points=200, thin=True))
+    np.testing.assert_array_equal(few.points, prepare_cloud(flat[:1800], CloudSpec(num_points=200)).points)
+    whole = prepare_cloud(flat, CloudSpec(num_points=200))
+    assert len(np.intersect1d(indices, whole.indices)) < 200
+
+
+def test_a_sampler_may_be_given() -> None:
+    points = prepare_cloud(cloud(500), CloudSpec(num_points=200), NUMPY).points
+    np.testing.assert_array_equal(points, prepare_cloud(cloud(500), CloudSpec(num_points=200)).points)

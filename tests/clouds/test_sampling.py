@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Farthest point order against a plain double loop; fpsample and NumPy give the same indices."""
+"""Farthest point order against a plain double loop; fpsample, torch-quickfps and NumPy give the same indices."""
 
 from __future__ import annotations
 
 import itertools
 import json
 import math
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -16,9 +15,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from doorstate.clouds import sampling
 from doorstate.clouds.preparation import CloudSpec, prepare_cloud
-from doorstate.clouds.sampling import bucket_farthest_points, farthest_point_indices
+from doorstate.clouds.samplers import NUMPY, Sampler, find_fpsample, find_torch_quickfps
+from doorstate.clouds.sampling import farthest_point_indices
 from doorstate.io.camera import Intrinsics
 from doorstate.io.depth import depth_to_points
 from doorstate.simulation.frames import replay
@@ -26,21 +25,21 @@ from doorstate.simulation.presets import PRESETS, draw_rows
 from doorstate.types import Indices, Points
 
 GAZEBO = Path(__file__).resolve().parents[1] / "fixtures" / "gazebo"
-Choose = Callable[[Points, int], Indices]
+COMPILED = {"fpsample": find_fpsample, "torch-quickfps": find_torch_quickfps}
 
 
-def numpy_indices(points: Points, count: int) -> Indices:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sampling, "fpsample", None)
-        return farthest_point_indices(points, count)
+def compiled_sampler(library: str) -> Sampler:
+    return COMPILED[library]() or pytest.skip(f"{library} is not installed")
 
 
-def fpsample_indices(points: Points, count: int) -> Indices:
-    pytest.importorskip("fpsample")
-    return farthest_point_indices(points, count)
+@pytest.fixture(scope="module", params=["numpy", *COMPILED])
+def sampler(request: pytest.FixtureRequest) -> Sampler:
+    return NUMPY if request.param == "numpy" else compiled_sampler(request.param)
 
 
-both_forms = pytest.mark.parametrize("choose", [numpy_indices, fpsample_indices], ids=["numpy", "fpsample"])
+@pytest.fixture(scope="module", params=list(COMPILED))
+def compiled(request: pytest.FixtureRequest) -> Sampler:
+    return compiled_sampler(request.param)
 
 
 def plain_order(points: Points, count: int) -> list[int]:
@@ -94,17 +93,17 @@ def simulated_cloud(index: int, count: int) -> Points:
     ).points
 
 
-@both_forms
 @pytest.mark.parametrize(("seed", "count"), [(0, 1), (1, 2), (2, 3), (3, 40), (4, 200)])
-def test_equals_the_double_loop(choose: Choose, seed: int, count: int) -> None:
+def test_equals_the_double_loop(sampler: Sampler, seed: int, count: int) -> None:
     points = random_cloud(seed, count)
-    assert choose(points, min(count, 60)).tolist() == plain_order(points, min(count, 60))
+    assert farthest_point_indices(points, min(count, 60), sampler).tolist() == plain_order(
+        points, min(count, 60)
+    )
 
 
-@both_forms
-def test_a_tree_of_several_leaves_changes_nothing(choose: Choose) -> None:
+def test_a_tree_of_several_leaves_changes_nothing(sampler: Sampler) -> None:
     points = random_cloud(5, 9000)
-    order = choose(points, 400)
+    order = farthest_point_indices(points, 400, sampler)
     own, largest = distances_to_earlier(points, order)
     assert own == largest
     assert order[0] == plain_order(points, 1)[0]
@@ -114,15 +113,14 @@ def test_an_order_computed_by_hand() -> None:
     line = np.zeros((4, 3), np.float32)
     line[:, 0] = [0, 1, 2, 3]
     # 1 and 2 are equally far from both ends: without a tree the lower row goes first.
-    assert bucket_farthest_points(line, 4, height=0).tolist() == [0, 3, 1, 2]
+    assert NUMPY.choose(line, 4, 0).tolist() == [0, 3, 1, 2]
     line[:, 0] = [0, 1, 0, 1]
-    assert bucket_farthest_points(line, 4, height=0).tolist() == [0, 1, 0, 0]
+    assert NUMPY.choose(line, 4, 0).tolist() == [0, 1, 0, 0]
 
 
-@both_forms
-def test_starts_at_the_point_farthest_from_below_and_behind(choose: Choose) -> None:
+def test_starts_at_the_point_farthest_from_below_and_behind(sampler: Sampler) -> None:
     points = np.array([[0, 0, 0], [5, 0, 0], [4, 4, 4], [0, 6, 0]], np.float32)
-    assert choose(points, 1).tolist() == [2]
+    assert farthest_point_indices(points, 1, sampler).tolist() == [2]
 
 
 @st.composite
@@ -147,38 +145,35 @@ def clouds(draw: st.DrawFn) -> Points:
 
 @given(points=clouds())
 @settings(deadline=None, max_examples=60)
-def test_both_implementations_give_the_same_indices(points: Points) -> None:
+def test_all_implementations_give_the_same_indices(compiled: Sampler, points: Points) -> None:
     count = min(len(points), 150)
-    np.testing.assert_array_equal(fpsample_indices(points, count), numpy_indices(points, count))
+    expected = farthest_point_indices(points, count, NUMPY)
+    np.testing.assert_array_equal(farthest_point_indices(points, count, compiled), expected)
 
 
-def test_both_implementations_split_their_trees_alike_where_points_lie_on_the_mean() -> None:
-    pytest.importorskip("fpsample")
-    fpsample_form = sampling._fpsample_farthest_points
+def test_all_implementations_split_their_trees_alike_where_points_lie_on_the_mean(compiled: Sampler) -> None:
     rng = np.random.default_rng(0)
     for _ in range(300):
         points = rng.integers(0, 4, (int(rng.integers(8, 33)), 3)).astype(np.float32)
         points[0] = -1  # lowest on every axis, as the anchor is
         height = int(rng.integers(1, 4))
-        expected = fpsample_form(points, 8, height)
-        np.testing.assert_array_equal(bucket_farthest_points(points, 8, height), expected)
+        np.testing.assert_array_equal(compiled(points, 8, height), NUMPY(points, 8, height))
 
 
-def test_both_implementations_split_their_trees_alike_where_float32_sums_drift() -> None:
-    pytest.importorskip("fpsample")
-    fpsample_form = sampling._fpsample_farthest_points
+def test_all_implementations_split_their_trees_alike_where_float32_sums_drift(compiled: Sampler) -> None:
     rng = np.random.default_rng(0)
     points = rng.integers(0, 4, (20_000, 3)).astype(np.float32)
     points[:, 0] = 0.1  # the running sum of these is not their number times 0.1
     points[0], points[1] = (-20, -1, -1), (20.2, 4, 4)
-    np.testing.assert_array_equal(bucket_farthest_points(points, 18, 1), fpsample_form(points, 18, 1))
+    np.testing.assert_array_equal(compiled(points, 18, 1), NUMPY(points, 18, 1))
 
 
 @pytest.mark.parametrize("number", [4, 17])
-def test_both_implementations_give_the_same_indices_of_a_whole_frame(number: int) -> None:
+def test_all_implementations_give_the_same_indices_of_a_whole_frame(compiled: Sampler, number: int) -> None:
     points = gazebo_cloud(number)
     assert len(points) > 150_000
-    np.testing.assert_array_equal(fpsample_indices(points, 400), numpy_indices(points, 400))
+    expected = farthest_point_indices(points, 400, NUMPY)
+    np.testing.assert_array_equal(farthest_point_indices(points, 400, compiled), expected)
 
 
 @given(points=clouds())
@@ -205,13 +200,13 @@ def test_the_first_points_of_a_sampled_cloud_are_its_sample(length: int, prefix:
     np.testing.assert_array_equal(farthest_point_indices(points, prefix), np.arange(prefix))
 
 
-@both_forms
 @given(seed=st.integers(0, 2**32 - 1))
 @settings(deadline=None, max_examples=20)
-def test_the_order_of_the_file_does_not_matter(choose: Choose, seed: int) -> None:
+def test_the_order_of_the_file_does_not_matter(sampler: Sampler, seed: int) -> None:
     points = random_cloud(seed, 3000)
     shuffle = np.random.default_rng(seed).permutation(len(points))
-    np.testing.assert_array_equal(shuffle[choose(points[shuffle], 100)], choose(points, 100))
+    shuffled = farthest_point_indices(points[shuffle], 100, sampler)
+    np.testing.assert_array_equal(shuffle[shuffled], farthest_point_indices(points, 100, sampler))
 
 
 @given(seed=st.integers(0, 2**32 - 1), scale=st.floats(0.2, 5.0), mirror=st.booleans())

@@ -20,7 +20,7 @@ def info(as_json: Annotated[bool, typer.Option("--json", help="Print one JSON ob
       doorstate info --json
     """
     from doorstate.cli.console import print_table
-    from doorstate.clouds.sampling import HAS_FPSAMPLE
+    from doorstate.clouds.samplers import choose_sampler
     from doorstate.networks.packaged import packaged_networks
     from doorstate.rules import create_rule, list_rules
     from doorstate.training.environment import describe_environment
@@ -30,7 +30,7 @@ def info(as_json: Annotated[bool, typer.Option("--json", help="Print one JSON ob
     except ImportError as error:
         raise MissingExtraError(f"info needs the package {error.name}") from error
 
-    environment = describe_environment() | {"fpsample": HAS_FPSAMPLE}
+    environment = describe_environment() | {"sampling": choose_sampler(import_torch=True).library}
     networks: list[dict[str, Any]] = [
         {
             "network": name,

@@ -10,15 +10,16 @@ from numpy.typing import NDArray
 
 from doorstate._models import FrozenModel
 from doorstate.clouds.measured import is_measured
+from doorstate.clouds.samplers import Sampler
 from doorstate.clouds.sampling import farthest_point_indices
 from doorstate.clouds.shape import check_shape
+from doorstate.clouds.thinning import thinned_pixels, thinned_points
 from doorstate.clouds.units import check_units, median_range_m
 from doorstate.errors import TooFewPointsError
 from doorstate.types import MAX_COORDINATE, Indices, Points
 
 NUM_POINTS = 4096  # as in the paper
 MIN_POINTS = 128  # fewer cannot fill the largest neighbourhood of a network
-_PIXELS_PER_POINT = 16  # to sample from after thinning
 
 
 class CloudSpec(FrozenModel):
@@ -26,8 +27,9 @@ class CloudSpec(FrozenModel):
 
     Attributes:
         num_points: points to keep.
-        thin: sample from every second, third, ... row and column of an organized cloud only, as long as 16 times
-            `num_points` pixels remain. Several times faster, and no point moves by more than a few pixels.
+        thin: sample from a part of the points only: every second, third, ... row and column of an organized cloud, one
+            point in each cell of a grid of a flat one, as long as 16 or 8 times `num_points` remain. Several times
+            faster, and no point moves by more than a few pixels or a cell.
         max_depth_m: drop points farther ahead, along x. Farthest-point sampling spreads over space, so that surfaces
             beyond the training data, such as the end of a corridor, would take most of the points.
     """
@@ -47,7 +49,9 @@ class PreparedCloud(NamedTuple):
     indices: Indices  # (n,)
 
 
-def prepare_cloud(points: Points, spec: CloudSpec = DEFAULT_SPEC) -> PreparedCloud:
+def prepare_cloud(
+    points: Points, spec: CloudSpec = DEFAULT_SPEC, sampler: Sampler | None = None
+) -> PreparedCloud:
     """Drop unmeasured points, check the rest, and keep `spec.num_points` of them in farthest-point order.
 
     A cloud with fewer distinct points gives all of them, each once; points are never repeated.
@@ -56,37 +60,41 @@ def prepare_cloud(points: Points, spec: CloudSpec = DEFAULT_SPEC) -> PreparedClo
         points: (N, 3) or organized (H, W, 3) metres; NaN, infinite, (0, 0, 0) or beyond 1000 km where nothing was
             measured.
         spec: number of points, thinning and depth limit.
+        sampler: implementation of farthest point sampling; all give the same points. None: `choose_sampler()`.
 
     Raises:
         CloudContentError: another shape, or units that cannot be metres.
         TooFewPointsError: empty, nothing measured, or fewer than 128 distinct points.
     """
     cloud = check_shape(points)
-    flat = cloud.reshape(-1, 3)
-    rows = np.arange(len(flat))
-    if spec.thin and cloud.ndim == 3:
-        height, width, _ = cloud.shape
-        rows = _thinned_rows(height, width, spec.num_points)
-        flat = flat[rows]
-    flat = np.asarray(flat, dtype=np.float32)
-    measured = _measured_rows(flat)
-    clean = flat[measured]
-    check_units(clean)
-    if spec.max_depth_m is not None:
-        near = _near_points(clean, spec.max_depth_m)
-        measured, clean = measured[near], clean[near]
-    sampled = farthest_point_indices(clean, min(spec.num_points, len(clean)))
+    rows, clean = _candidates(cloud, spec)
+    sampled = farthest_point_indices(clean, min(spec.num_points, len(clean)), sampler)
     # Sampling repeats a point only after all distinct ones, so the repeats are at the end.
     sampled = sampled[: len(np.unique(sampled))]
     if len(sampled) < min(spec.num_points, MIN_POINTS):
         raise _too_few(f"{len(sampled)} distinct of {len(clean)} measured")
-    return PreparedCloud(clean[sampled], rows[measured[sampled]])
+    return PreparedCloud(clean[sampled], rows[sampled])
 
 
-def _thinned_rows(height: int, width: int, num_points: int) -> Indices:
-    """Return the rows, in the flattened image, of the pixels in every k-th row and column."""
-    step = max(1, int(np.sqrt(height * width / (_PIXELS_PER_POINT * num_points))))
-    return (np.arange(0, height, step)[:, None] * width + np.arange(0, width, step)).ravel()
+def _candidates(cloud: Points, spec: CloudSpec) -> tuple[Indices, Points]:
+    """Return the points to sample from: their rows (n,) in the flattened raw cloud, and themselves (n, 3) float32."""
+    flat = cloud.reshape(-1, 3)
+    rows = np.arange(len(flat))
+    organized = cloud.ndim == 3
+    if spec.thin and organized:
+        rows = thinned_pixels(cloud.shape[0], cloud.shape[1], spec.num_points)
+        flat = flat[rows]
+    flat = np.asarray(flat, dtype=np.float32)
+    measured = _measured_rows(flat)
+    rows, clean = rows[measured], flat[measured]
+    check_units(clean)
+    if spec.max_depth_m is not None:
+        near = _near_points(clean, spec.max_depth_m)
+        rows, clean = rows[near], clean[near]
+    if spec.thin and not organized:
+        kept = thinned_points(clean, spec.num_points)
+        rows, clean = rows[kept], clean[kept]
+    return rows, clean
 
 
 def _measured_rows(flat: Points) -> Indices:

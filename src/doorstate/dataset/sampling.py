@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from doorstate.clouds.preparation import CloudSpec, PreparedCloud, prepare_cloud
+from doorstate.clouds.samplers import choose_sampler
 from doorstate.errors import CloudContentError
 from doorstate.simulation.frames import Frame
 from doorstate.types import Points
@@ -18,7 +19,7 @@ def sample_cloud(points: Points, spec: CloudSpec) -> PreparedCloud:
     Raises:
         CloudContentError: there are fewer distinct points.
     """
-    prepared = prepare_cloud(points, spec)
+    prepared = prepare_cloud(points, spec, choose_sampler(import_torch=True))
     count = len(prepared.points)
     if count < spec.num_points:
         raise CloudContentError(
