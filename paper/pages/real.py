@@ -19,7 +19,7 @@ from doorstate.evaluation.table import (
     label_column,
     number_column,
 )
-from doorstate.evaluation.views import STATE_WORDS
+from doorstate.pages.colors import STATE_WORDS
 from doorstate.training.run_folder import read_json
 from doorstate.types import ABSTAINED, STATES
 

@@ -24,7 +24,7 @@ from doorstate.evaluation.table import (
     number,
     number_column,
 )
-from doorstate.evaluation.views import STATE_WORDS
+from doorstate.pages.colors import STATE_WORDS
 from doorstate.training.recipes import AUTHORS
 from doorstate.types import STATES
 

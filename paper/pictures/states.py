@@ -9,7 +9,8 @@ from matplotlib.figure import Figure
 
 from doorstate.dataset.store import open_dataset
 from doorstate.evaluation.figures.samples import draw_cloud, part_legend
-from doorstate.evaluation.views import STATE_WORDS, picture_axes
+from doorstate.evaluation.views import picture_axes
+from doorstate.pages.colors import STATE_WORDS
 from doorstate.types import STATES
 
 from .. import paths

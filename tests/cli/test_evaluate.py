@@ -102,7 +102,7 @@ def test_page_draws_clouds_and_filters_frames(report: Path) -> None:
         assert set(visible) == wrong
         chips.nth(0).click()
         page.locator(".card .cloud").first.click()
-        page.wait_for_selector(".live .main-svg")
+        page.wait_for_selector("div.cloud.large canvas.turnable")
         assert errors == []
 
 

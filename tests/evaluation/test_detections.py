@@ -15,7 +15,8 @@ from doorstate.errors import RunError
 from doorstate.evaluation.detections import draw_detections, read_detections
 from doorstate.evaluation.figures.errors import surest_errors_figure
 from doorstate.evaluation.predictions import load_results
-from doorstate.evaluation.views import DETECTION_COLORS, oblique_view
+from doorstate.evaluation.views import oblique_view
+from doorstate.pages.colors import DETECTION_COLORS
 from doorstate.rules.base import Detection
 from tests.evaluation.conftest import MakeComparison
 

@@ -11,8 +11,8 @@ import pytest
 
 from doorstate.dataset.store import PreparedDataset
 from doorstate.evaluation import gallery as gallery_module
+from doorstate.evaluation.errors import missed_by
 from doorstate.evaluation.gallery import build_gallery
-from doorstate.evaluation.pages import missed_by
 from doorstate.evaluation.predictions import load_results
 from tests.evaluation.conftest import MakeComparison
 

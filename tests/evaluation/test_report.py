@@ -8,8 +8,6 @@ import re
 from html.parser import HTMLParser
 from pathlib import Path
 
-from plotly.offline import get_plotlyjs
-
 from doorstate.dataset.store import PreparedDataset
 from doorstate.evaluation.predictions import load_results
 from doorstate.evaluation.report import render_report, write_dataset_report, write_report
@@ -83,7 +81,6 @@ def test_everything_is_written_self_contained_and_the_same_twice(
     (policy,) = (attrs["content"] or "" for _, attrs in page.tags if "http-equiv" in attrs)
     assert "default-src 'none'" in policy
     assert "http" not in policy
-    assert page.scripts["plotly"] == get_plotlyjs()
     assert not re.search(r"https?://|fetch\(|XMLHttpRequest|import\(", page.scripts["code"])
     targets = {attrs["id"] for _, attrs in page.tags if "id" in attrs}
     assert {address[1:] for address in page.addresses() if address.startswith("#")} <= targets

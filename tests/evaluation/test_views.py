@@ -11,14 +11,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from doorstate.evaluation.views import (
-    PART_COLORS,
     REGION_COLORS,
-    STATE_COLORS,
-    VIEW_ELEVATION_RAD,
     oblique_view,
     outside_legend,
     point_colors,
 )
+from doorstate.pages.colors import PART_COLORS, STATE_COLORS, VIEW_ELEVATION_RAD
 from doorstate.types import STATES, Part
 
 AXES = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], dtype=np.float32)

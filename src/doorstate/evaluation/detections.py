@@ -6,15 +6,15 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from pydantic import TypeAdapter, ValidationError
 
 from doorstate.errors import RunError
-from doorstate.evaluation.metrics import Floats
-from doorstate.evaluation.views import DETECTION_COLORS, oblique_view
+from doorstate.evaluation.views import oblique_view
+from doorstate.pages.colors import DETECTION_COLORS
+from doorstate.pages.encoding import closed
 from doorstate.rules.base import Detection
 
 Detections = Mapping[str, tuple[Detection, ...]]
@@ -51,17 +51,3 @@ def draw_detections(axis: Axes, detections: Iterable[Detection]) -> None:
         marker = "o" if len(screen) == 1 else ""
         color = DETECTION_COLORS.get(detection.name, DETECTION_COLORS["edge"])
         axis.plot(*screen.T, marker=marker, markersize=3, linewidth=1.2, color=color, zorder=5)
-
-
-def encode_detections(detections: Iterable[Detection]) -> list[dict[str, Any]]:
-    """Encode detections for the page: name and points in metres, outlines closed."""
-    return [
-        {"name": detection.name, "points": np.round(closed(detection), 3).tolist()}
-        for detection in detections
-    ]
-
-
-def closed(detection: Detection) -> Floats:
-    """Return the (K, 3) points of a detection; an outline ends where it starts."""
-    points = detection.points_m
-    return np.concatenate([points, points[:1]]) if len(points) > 2 else points

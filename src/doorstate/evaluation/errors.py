@@ -71,3 +71,8 @@ def order_errors(errors: pd.DataFrame) -> pd.DataFrame:
     order = errors.assign(undecidable=is_undecidable(errors), descending=-errors["confidence"])
     order = order.sort_values(["undecidable", "descending", "sample_id"], kind="stable")
     return errors.loc[order.index]
+
+
+def missed_by(count: int, methods: int) -> str:
+    """Return the heading of samples that `count` of the methods misclassified."""
+    return f"Missed by {count or 'none'} of {methods}"

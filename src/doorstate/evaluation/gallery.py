@@ -11,11 +11,10 @@ from typing import Any
 import pandas as pd
 
 from doorstate.dataset.store import PreparedDataset
-from doorstate.evaluation.detections import encode_detections
-from doorstate.evaluation.errors import order_errors
-from doorstate.evaluation.pages import encode_cloud, missed_by, picture_uri
+from doorstate.evaluation.errors import missed_by, order_errors
 from doorstate.evaluation.results import PROBABILITY_COLUMNS, Results
 from doorstate.evaluation.undecidable import is_undecidable
+from doorstate.pages.encoding import encode_cloud, encode_detections, picture_uri
 
 CARDS_PER_METHOD = 16
 _DRAWN_POINTS = 2048

@@ -19,13 +19,14 @@ from doorstate.evaluation.gallery import build_gallery
 from doorstate.evaluation.manifest import manifest_frame
 from doorstate.evaluation.method_scores import predicted_labels
 from doorstate.evaluation.metrics import confusion, ratio
-from doorstate.evaluation.pages import data_uri, render_page
 from doorstate.evaluation.predictions import join_results, load_results
 from doorstate.evaluation.results import Results
 from doorstate.evaluation.stratum_tables import dataset_tables
 from doorstate.evaluation.table import Table
 from doorstate.evaluation.tables import build_tables, save_tables
-from doorstate.evaluation.views import DETECTION_COLORS, STATE_COLORS, STATE_WORDS
+from doorstate.pages.colors import DETECTION_COLORS, STATE_COLORS, STATE_WORDS
+from doorstate.pages.encoding import data_uri
+from doorstate.pages.render import render_page
 from doorstate.types import STATES
 
 
@@ -98,6 +99,7 @@ def render_report(
     gallery = build_gallery(results, dataset)
     return render_page(
         "report.html.j2",
+        "doorstate.evaluation",
         results=results,
         config=results.config,
         recipe=json.dumps(results.config.recipe, indent=2, default=str),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Colours of states, regions and parts, the oblique view of clouds, and the style of axes, in every picture."""
+"""Colours of regions and networks, the oblique view of clouds, and the style of axes, in every figure."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ import numpy as np
 from matplotlib.colors import Normalize, to_rgba_array
 from numpy.typing import NDArray
 
-from doorstate.types import ABSTAINED, Part, Points
+from doorstate.pages.colors import PART_COLORS, VIEW_ELEVATION_RAD
+from doorstate.types import Part, Points
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -28,8 +29,6 @@ REGION_COLORS = {
     "yellow": "#F0E442",
     "blue": "#0072B2",
 }
-STATE_WORDS = {"closed": "closed", "semi_open": "semi-open", "open": "open", ABSTAINED: "abstained"}
-STATE_COLORS = {"closed": "#0072B2", "semi_open": "#E69F00", "open": "#CC79A7"}
 NETWORK_COLORS = {
     "pointnet": "#0072B2",
     "pointnet2": "#D55E00",
@@ -37,28 +36,6 @@ NETWORK_COLORS = {
     "pointcnn": "#CC79A7",
     "point2sequence": "#E69F00",
 }
-# Detections of rules, over clouds in the colours of their parts.
-DETECTION_COLORS = {
-    "wall": "#0072B2",
-    "leaf": "#B3202C",
-    "opening": "#00A651",
-    "surface": "#B3202C",
-    "edge": "#111111",
-    "corner": "#111111",
-}
-PART_COLORS = {
-    Part.WALL: "#A9B1BC",
-    Part.FRAME: "#7B4FA3",
-    Part.LEAF: "#D55E00",
-    Part.FLOOR: "#6C8EAD",
-    Part.CEILING: "#C9CED6",
-    Part.OTHER: "#009E73",
-    Part.NONE: "#333333",
-}
-
-# The eye is right behind the camera, so that left and right are as in its picture, and above it.
-VIEW_ELEVATION_RAD = math.radians(25.0)
-
 
 # Widths in a legend with matplotlib's default font size: a letter, and a mark with its margins.
 _LETTER_IN, _MARK_IN = 0.076, 0.62

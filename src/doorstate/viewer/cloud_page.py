@@ -3,26 +3,32 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from doorstate.clouds.measured import is_measured
 from doorstate.clouds.preparation import NUM_POINTS
 from doorstate.errors import DoorstateError, WriteParameter, python_parameter
-from doorstate.evaluation.detections import encode_detections
-from doorstate.evaluation.pages import encode_bytes, encode_cloud, render_page
-from doorstate.evaluation.views import STATE_COLORS
 from doorstate.inference.network_predictor import NetworkPredictor
 from doorstate.inference.predictor import Predictor
 from doorstate.inference.serialization import prediction_to_dict
+from doorstate.pages.colors import STATE_COLORS
+from doorstate.pages.encoding import encode_bytes, encode_cloud, encode_detections
+from doorstate.pages.render import render_page
 from doorstate.types import STATES, Points
 from doorstate.viewer.named_clouds import NamedCloud
+from doorstate.viewer.predicted_door import Line, predicted_door
 
 Entry = dict[str, Any]
-"""Cloud as the page gets it: `name` and `truth`, and either `error` or `prediction`, `cloud` and `detections`."""
+"""Cloud as the page gets it: `name` and `truth`, and either `error` or `prediction`, `cloud`, `whole`, `floor_z_m` and
+`detections`."""
 
+WHOLE_POINTS = 8000  # of the whole cloud, drawn under the points that were used
+_FLOOR_SHARE = 0.01  # of the points lie below the floor, by noise
 CHANNEL_STEPS = 32  # a channel count is stored in steps of 1/32, so that two bytes hold 0 to 2047
 
 
@@ -51,11 +57,38 @@ def make_entry(
         steps = np.rint(counts[:NUM_POINTS] * CHANNEL_STEPS).astype("<u2")
         entry["channels"] = encode_bytes(steps.tobytes())
     parts = None if named.parts is None else named.parts[prepared.indices[:NUM_POINTS]]
+    whole = thin_for_display(named.cloud)
+    floor_z_m = float(np.quantile(whole[:, 2], _FLOOR_SHARE))
     return entry | {
         "prediction": prediction_to_dict(prediction, parameter),
         "cloud": encode_cloud(prepared.points[:NUM_POINTS], parts),
-        "detections": encode_detections(prediction.detections),
+        "whole": encode_cloud(whole),
+        "floor_z_m": round(floor_z_m, 3),
+        "detections": [
+            *encode_detections(prediction.detections),
+            *map(_encode_line, predicted_door(prediction, floor_z_m)),
+        ],
     }
+
+
+def thin_for_display(cloud: Points, count: int = WHOLE_POINTS) -> Points:
+    """Return at most `count` measured points, spread evenly over rows and columns or over the order of points.
+
+    Args:
+        cloud: (N, 3) or organized (H, W, 3).
+        count: largest number of points.
+    """
+    measured = is_measured(cloud)
+    share = max(1.0, float(measured.sum()) / count)
+    if cloud.ndim == 3:
+        step = math.ceil(math.sqrt(share))
+        cloud, measured = cloud[::step, ::step], measured[::step, ::step]
+    points = cloud[measured]
+    return points[:: max(1, math.ceil(len(points) / count))]
+
+
+def _encode_line(line: Line) -> dict[str, Any]:
+    return {"name": line.name, "points": np.round(line.points_m, 3).tolist(), "label": line.label}
 
 
 def _channel_counts(predictor: Predictor, points: Points) -> NDArray[np.float32] | None:
@@ -79,8 +112,8 @@ def render_cloud_page(predictor: Predictor, entries: Sequence[Entry], *, live: b
     return render_page(
         "view.html.j2",
         "doorstate.viewer",
-        predictor=str(predictor),
         live=live,
+        predictor=str(predictor),
         page_data={
             "entries": list(entries),
             "live": live,

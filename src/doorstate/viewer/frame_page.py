@@ -10,10 +10,11 @@ from itertools import groupby
 from doorstate import __version__
 from doorstate._jobs import Progress, no_progress
 from doorstate.dataset.labelled import LabelledFrame
+from doorstate.evaluation.errors import missed_by
 from doorstate.evaluation.frames import FrameResults, Predictors
-from doorstate.evaluation.pages import missed_by, render_page
 from doorstate.evaluation.table import Table
-from doorstate.evaluation.views import DETECTION_COLORS, STATE_COLORS
+from doorstate.pages.colors import DETECTION_COLORS, STATE_COLORS
+from doorstate.pages.render import render_page
 from doorstate.types import STATES
 from doorstate.viewer.cloud_page import CHANNEL_STEPS, Entry, make_entry
 from doorstate.viewer.frame_pictures import frame_pictures

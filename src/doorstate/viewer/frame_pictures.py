@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from doorstate.dataset.labelled import LabelledFrame
-from doorstate.evaluation.pages import picture_uri
+from doorstate.pages.encoding import picture_uri
 from doorstate.types import Points
 
 _DEPTH_QUANTILES = (0.02, 0.98)  # ends of the colour scale, so that outliers do not take all colours

@@ -14,7 +14,8 @@ from doorstate.evaluation.detections import draw_detections
 from doorstate.evaluation.errors import order_errors
 from doorstate.evaluation.figures.samples import draw_cloud, part_legend
 from doorstate.evaluation.results import Results
-from doorstate.evaluation.views import STATE_WORDS, picture_axes
+from doorstate.evaluation.views import picture_axes
+from doorstate.pages.colors import STATE_WORDS
 
 _COLUMNS = 5
 _TITLE_LETTERS = 40  # of a line as wide as a picture

@@ -18,7 +18,8 @@ from doorstate.dataset.strata import REGIONS
 from doorstate.evaluation.metrics import Floats
 from doorstate.evaluation.results import Results
 from doorstate.evaluation.undecidable import is_undecidable
-from doorstate.evaluation.views import REGION_COLORS, STATE_COLORS, STATE_WORDS, outside_legend
+from doorstate.evaluation.views import REGION_COLORS, outside_legend
+from doorstate.pages.colors import STATE_COLORS, STATE_WORDS
 from doorstate.simulation.manifest import unflatten
 from doorstate.simulation.scene import Door, Opening
 from doorstate.simulation.scene.door_boxes import leaf_boxes

@@ -18,14 +18,13 @@ from doorstate.evaluation.manifest import manifest_frame
 from doorstate.evaluation.strata import has_strata
 from doorstate.evaluation.undecidable import is_undecidable
 from doorstate.evaluation.views import (
-    PART_COLORS,
     REGION_COLORS,
-    STATE_WORDS,
     oblique_view,
     outside_legend,
     picture_axes,
     point_colors,
 )
+from doorstate.pages.colors import PART_COLORS, STATE_WORDS
 from doorstate.types import STATES, Part
 
 _MIDDLE_M = 2.25

@@ -10,7 +10,8 @@ from matplotlib.lines import Line2D
 from doorstate.evaluation.method_scores import f1_intervals, fold_scores, predicted_labels
 from doorstate.evaluation.metrics import confusion, macro_f1, ratio
 from doorstate.evaluation.results import Results
-from doorstate.evaluation.views import STATE_WORDS, graph_axes, outside_legend
+from doorstate.evaluation.views import graph_axes, outside_legend
+from doorstate.pages.colors import STATE_WORDS
 from doorstate.types import STATES
 
 _POOLED, _INK = "#0072B2", "#333333"

@@ -22,29 +22,10 @@
   }
 
   // ---- clouds ----------------------------------------------------------------------------------------------
-  const decode = (sample) => clouds.decode(data.clouds[sample]);
-
-  // Detections of rules in a sample: [method, { name, points }] in the order of the predictions.
-  const detectionsOf = (sample) =>
-    Object.entries(data.detections[sample]).flatMap(([method, detections]) => detections.map((detection) => [method, detection]));
-
-  clouds.previewWhenVisible(document.querySelectorAll(".cloud canvas"), (canvas) => {
-    const { sample } = canvas.closest(".card").dataset;
-    const cloud = decode(sample);
-    const colors = cloud.parts ? clouds.partColors(cloud) : clouds.heightColors(cloud);
-    return { cloud, colors, detections: detectionsOf(sample).map(([, detection]) => detection) };
-  });
-
-  function open(button) {
+  clouds.previews(document.querySelectorAll("button.cloud"), (button) => {
     const { sample } = button.closest(".card").dataset;
-    const cloud = decode(sample);
-    const detections = detectionsOf(sample).map(([method, detection]) => clouds.detection(detection, `${method}: ${detection.name}`));
-    const points = cloud.parts ? clouds.byPart(cloud) : clouds.byHeight(cloud);
-    clouds.replaceByPlot(button, [...points, clouds.camera(), ...detections]);
-  }
-
-  document.addEventListener("click", (event) => {
-    const button = event.target.closest(".cloud");
-    if (button) open(button);
+    const cloud = clouds.decode(data.clouds[sample]);
+    const { colors } = cloud.parts ? clouds.byPart(cloud) : clouds.byHeight(cloud);
+    return { cloud, colors, detections: Object.values(data.detections[sample]).flat() };
   });
 })();

@@ -3,9 +3,12 @@
   const entries = [];
   const MAX_ENTRIES = 300; // of a stream; older ones are dropped
   const colors = ["part", "height", "channels"];
+  const TURN = 0.3; // of the eye to the right of the camera, so that the three axes differ
   const dark = matchMedia("(prefers-color-scheme: dark)");
   const element = (id) => document.getElementById(id);
   const [plot, list, follow] = [element("plot"), element("list"), element("follow")];
+  const view = clouds.view(plot.querySelector("canvas"), TURN);
+  view.turnable();
   let current = -1;
   let dropped = 0; // entries at the start of the stream
   let selectedColor = null;
@@ -25,20 +28,44 @@
   const hasColor = (entry, color) =>
     color === "height" || Boolean(color === "part" ? entry.cloud.parts : entry.channels);
 
-  function traces(entry, color) {
-    const cloud = clouds.decode(entry.cloud);
-    const points = color === "part" ? clouds.byPart(cloud)
-      : color === "channels" ? clouds.byChannels(cloud, clouds.channelsOf(entry)) : clouds.byHeight(cloud);
-    return [...points, clouds.camera(), ...entry.detections.map((detection) => clouds.detection(detection, detection.name))];
+  function colored(entry, cloud, color) {
+    if (color === "part") return clouds.byPart(cloud);
+    return color === "channels" ? clouds.byChannels(clouds.channelsOf(entry)) : clouds.byHeight(cloud);
   }
 
-  const NOTES = {
-    part: "Parts of the simulated scene.",
-    height: "",
-    channels: "Number of channels of the network's global feature that come from each point (critical points).",
-  };
+  // ---- rulers ----------------------------------------------------------------------------------------------
+  // Height above the floor, at the left of the cloud, with a mark every half metre.
+  function heightRuler(whole, floor) {
+    const [dx, dy] = [Math.sin(TURN), -Math.cos(TURN)]; // to the right on the screen
+    const across = Float32Array.from({ length: whole.count }, (_, i) => whole.xyz[3 * i] * dx + whole.xyz[3 * i + 1] * dy);
+    const leftmost = clouds.quantile(across, 0.005);
+    const edge = across.findIndex((value) => value <= leftmost);
+    const [x, y] = [whole.xyz[3 * edge] - 0.15 * dx, whole.xyz[3 * edge + 1] - 0.15 * dy];
+    const top = Math.max(0.5, Math.floor((clouds.quantile(clouds.heights(whole), 0.99) - floor) * 2) / 2);
+    const marks = Array.from({ length: 2 * top + 1 }, (_, k) => k / 2);
+    return [{ points: [[x, y, floor], [x, y, floor + top]], width: 1.5 }, ...marks.map((height) => ({
+      points: [[x, y, floor + height], [x - (height % 1 ? 0.04 : 0.08) * dx, y - (height % 1 ? 0.04 : 0.08) * dy, floor + height]], width: 1.5, side: -1,
+      label: height % 1 ? "" : `${height} m`,
+    }))];
+  }
+
+  // Arcs on the floor, a metre apart, for the distance from the camera.
+  function distanceArcs(whole, floor) {
+    const near = Array.from({ length: whole.count }, (_, i) => whole.xyz.subarray(3 * i, 3 * i + 3)).filter(([, , z]) => z < floor + 0.1);
+    const distances = near.map(([x, y]) => Math.hypot(x, y));
+    const turns = near.map(([x, y]) => Math.atan2(y, x));
+    const [first, last] = [Math.ceil(clouds.quantile(distances, 0.02)), Math.floor(clouds.quantile(distances, 0.98))];
+    const [right, left] = [clouds.quantile(turns, 0.05), clouds.quantile(turns, 0.95)];
+    return Array.from({ length: Math.max(0, last - first + 1) }, (_, k) => first + k).map((distance) => ({
+      points: Array.from({ length: 25 }, (_, k) => right + ((left - right) * (24 - k)) / 24)
+        .map((turn) => [distance * Math.cos(turn), distance * Math.sin(turn), floor]),
+      width: 1.5, faint: true, label: `${distance} m`,
+    }));
+  }
 
   // ---- one cloud -------------------------------------------------------------------------------------------
+  const PALE = 0.3; // opacity of the whole cloud under the points that were used
+
   function draw() {
     const entry = entries[current];
     plot.hidden = !entry?.cloud;
@@ -47,12 +74,46 @@
       chip.hidden = !entries.some((other) => other.cloud && hasColor(other, chip.dataset.color));
       chip.setAttribute("aria-pressed", String(chip.dataset.color === color));
     }
-    element("note").textContent = color ? NOTES[color] : "";
-    if (!color) return;
-    const layout = clouds.layout();
-    layout.uirevision = layout.scene.uirevision = "keep"; // keep the view that the user chose
-    clouds.plotly().react(plot, traces(entry, color), layout, clouds.config);
+    if (!color) return element("legend").replaceChildren();
+    const [cloud, whole] = [clouds.decode(entry.cloud), clouds.decode(entry.whole)];
+    const { legend, ...style } = colored(entry, cloud, color);
+    const door = clouds.detectionLines(entry.detections);
+    view.show({
+      layers: [{ cloud: whole, ...clouds.byHeight(whole), size: 1.6, opacity: PALE }, { cloud, ...style, size: 2.6 }],
+      lines: [...distanceArcs(whole, entry.floor_z_m), ...heightRuler(whole, entry.floor_z_m), ...door],
+      margin: plot.clientWidth < 500 ? 26 : 36, axes: true,
+    });
+    const drawn = new Map(door.map((line) => [line.name, line]));
+    element("legend").replaceChildren(...legend.map(swatch), ...[...drawn.values()].map(swatch));
   }
+
+  function swatch({ name, color, gradient, low, high }) {
+    const sample = make("i", { className: gradient ? "ramp" : "" });
+    sample.style.background = gradient || color;
+    return make("li", {}, ...(gradient ? [`${name} `, low, sample, high] : [sample, name]));
+  }
+
+  function hover(event) {
+    const point = event.buttons ? null : view.pointAt(event.clientX, event.clientY);
+    const tip = element("hover");
+    tip.hidden = !point;
+    if (!point) return;
+    tip.textContent = `x ${point.x.toFixed(2)}, y ${point.y.toFixed(2)}, z ${point.z.toFixed(2)} m`;
+    tip.style.left = `${Math.min(point.u + 12, plot.clientWidth - tip.offsetWidth - 4)}px`;
+    tip.style.top = `${Math.max(4, point.v - 28)}px`;
+  }
+
+  const metres = (value) => (value === undefined ? "" : `${value.toFixed(2)} m`);
+  const degrees = (value) => (value === undefined ? "" : `${value.toFixed(0)}°`);
+
+  const facts = (prediction) => [
+    ["opened", degrees(prediction.opening_angle_deg)],
+    ["free width", metres(prediction.passable_width_m)],
+    ["distance", prediction.door_x_m === undefined ? "" : metres(Math.hypot(prediction.door_x_m, prediction.door_y_m))],
+    ["hinge", prediction.hinge],
+    ["points used", prediction.points.toLocaleString("en")],
+    ["time", `${prediction.milliseconds.toFixed(0)} ms`],
+  ];
 
   function describe(entry) {
     const { prediction } = entry;
@@ -64,17 +125,16 @@
     }
     element("probabilities").replaceChildren(...(prediction?.state ? data.states : []).flatMap(
       (name) => {
-        const p = prediction.probabilities[name];
+        const p = prediction.probabilities?.[name];
+        if (p === undefined) return [];
         const filled = tinted(make("i"), name);
         filled.style.width = `${100 * p}%`;
         return [make("dt", {}, stateName(name)), make("dd", { className: "bar" }, filled),
           make("dd", { className: "number" }, `${(100 * p).toFixed(1)} %`)];
       }));
     element("reason").textContent = entry.error || prediction?.reason || "";
-    element("facts").textContent = prediction ? [
-      prediction.opening_angle_deg === undefined ? "" : `opened ${prediction.opening_angle_deg.toFixed(0)}°`,
-      `${prediction.points.toLocaleString("en")} points`, `${prediction.milliseconds.toFixed(0)} ms`,
-    ].filter(Boolean).join(", ") : "";
+    element("facts").replaceChildren(...(prediction ? facts(prediction) : []).filter(([, value]) => value).flatMap(
+      ([name, value]) => [make("dt", {}, name), make("dd", {}, value)]));
   }
 
   function show(index) {
@@ -136,8 +196,9 @@
     selectedColor = color;
     draw();
   });
-  dark.addEventListener("change", draw);
-  new ResizeObserver(() => { if (plot.data && !plot.hidden) window.Plotly.Plots.resize(plot); }).observe(plot);
+  dark.addEventListener("change", view.redraw);
+  plot.addEventListener("pointermove", hover);
+  plot.addEventListener("pointerleave", () => { element("hover").hidden = true; });
 
   data.entries.forEach(add);
   show(Math.min(Math.max(1, Number.parseInt(location.hash.slice(1), 10) || 1), entries.length) - 1);
