@@ -72,7 +72,7 @@ def networks(
     from benchmarks.networks import INFERENCE_BATCHES, Plan, measure_networks, table_of
     from benchmarks.networks_table import list_failures
     from benchmarks.store import Store
-    from doorstate.cli.console import progress_bar
+    from doorstate.cli.progress import progress_bar
 
     names, numbers_of_points = _parse_networks(networks), _parse_points(points)
     ports = {"pointnet": port_pointnet, "pointnet2": port_pointnet, "dgcnn": port_dgcnn}
@@ -112,7 +112,7 @@ def latency(
 ) -> None:
     """Latency from a raw 640 x 480 cloud in memory to a state, by stage."""
     from benchmarks.latency import latency_table, measure_latency
-    from doorstate.cli.console import progress_bar
+    from doorstate.cli.progress import progress_bar
 
     names, numbers_of_points = _parse_networks(networks), _parse_points(points)
     numbers_of_threads = _parse_integers("threads", threads, 1)
@@ -131,7 +131,7 @@ def rules(
 ) -> None:
     """Latency from a raw 640 x 480 cloud in memory to a state, of rules and two networks."""
     from benchmarks.rules import measure_rules, rules_table
-    from doorstate.cli.console import progress_bar
+    from doorstate.cli.progress import progress_bar
 
     with progress_bar("rules") as progress:
         rows = measure_rules(count, points, threads, repeats, progress)
@@ -150,7 +150,7 @@ def profile(
     """Time of a training step and of an inference, by groups of operators."""
     from benchmarks.clouds import simulated_clouds
     from benchmarks.profiling import measure_profile, profile_table, profiled_forms
-    from doorstate.cli.console import progress_bar
+    from doorstate.cli.progress import progress_bar
 
     if form not in ("plain", "fast", "both"):
         raise ConfigError(f"no form {form!r}", field="form", expected="plain, fast or both")
@@ -166,7 +166,7 @@ def knn(out: Out, points: Points = _ALL_POINTS, repeats: Repeats = 5, threads: T
     """Nearest neighbours in the feature space of DGCNN, by three methods."""
     from benchmarks.clouds import simulated_clouds
     from benchmarks.neighbours import measure_neighbours, neighbours_table
-    from doorstate.cli.console import progress_bar
+    from doorstate.cli.progress import progress_bar
 
     numbers_of_points = _parse_points(points)
     with progress_bar("knn") as progress:
@@ -194,7 +194,7 @@ def service(
     """
     from benchmarks.service import measure_service, service_table
     from doorstate._jobs import default_workers
-    from doorstate.cli.console import progress_bar
+    from doorstate.cli.progress import progress_bar
 
     numbers_of_clients, workers = _parse_integers("clients", clients, 1), workers or default_workers()
     options = ["--network", network, "--workers", str(workers)]

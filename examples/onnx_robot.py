@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Predict cloud after cloud without torch, and report late predictions.
 
-    doorstate export pointnet2 --points 512 --out door.onnx     # once, with torch
+    doorstate export --points 512 --out door.onnx     # once, with torch
     python examples/onnx_robot.py door.onnx recording/          # on the robot
 
 docs/onnx.md lists the packages that the robot needs.

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from doorstate import Predictor, ReadOptions, read_cloud
 from doorstate.cli.compare import compare_with_display
-from doorstate.cli.console import progress_bar
+from doorstate.cli.progress import progress_bar
 from doorstate.clouds.preparation import CloudSpec
 from doorstate.dataset.preparation import Preparation
 from doorstate.dataset.prepare import prepare_dataset

@@ -132,7 +132,7 @@ def test_onnx_robot_needs_no_torch(doors: Path, weights: Path, tmp_path: Path) -
     pytest.importorskip("onnxruntime")
     exported, recording = tmp_path / "door.onnx", tmp_path / "recording"
     doorstate = Path(sys.executable).with_name("doorstate")
-    command = [doorstate, "export", "pointnet", "--weights", weights, "--out", exported, "--clouds", "3"]
+    command = [doorstate, "export", "--weights", weights, "--out", exported, "--clouds", "3"]
     subprocess.run(command, check=True, capture_output=True)
     shutil.copytree(doors / "open", recording)
     *predictions, last = example("onnx_robot", exported, recording).splitlines()

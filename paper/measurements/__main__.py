@@ -23,7 +23,7 @@ def gate(
     out: Out = Path("docs/benchmarks"), network: Network = "ogurob-pointnet2", count: Count = 100
 ) -> None:
     """Count clouds that the gate rejects, and closed doors reported open, when parts of the cloud are missing."""
-    from doorstate.cli.console import progress_bar
+    from doorstate.cli.progress import progress_bar
 
     from .gate import gate_table, measure_gate
 
@@ -37,7 +37,7 @@ def thinning(
     out: Out = Path("docs/benchmarks"), network: Network = "ogurob-pointnet2", count: Count = 300
 ) -> None:
     """Compare predictions from a part of the pixels with predictions from all pixels."""
-    from doorstate.cli.console import progress_bar
+    from doorstate.cli.progress import progress_bar
 
     from .thinning import measure_thinning, thinning_table
 
@@ -52,7 +52,7 @@ def sensors(
     frames: Annotated[int, typer.Option(help="Frames of each measurement.", min=1)] = 16,
 ) -> None:
     """Compare noise, steps, shadows and missing pixels of the sensor models with published figures."""
-    from doorstate.cli.console import progress_bar
+    from doorstate.cli.progress import progress_bar
 
     from .sensors import measure_sensors, sensors_table
 
@@ -70,7 +70,7 @@ def export(
     count: Count = 102,
 ) -> None:
     """Compare exported networks with torch, in float32 and with 8-bit matrices."""
-    from doorstate.cli.console import progress_bar
+    from doorstate.cli.progress import progress_bar
     from doorstate.inference.reference_clouds import reference_clouds
     from doorstate.networks import list_networks
     from doorstate.training.run_folder import run_of

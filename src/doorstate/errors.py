@@ -179,7 +179,7 @@ def unknown_name(
         field: parameter that holds the name.
     """
     names = list(names)
-    close = get_close_matches(name, names, n=1)
+    close = get_close_matches(name, names, n=1) or [other for other in names if name.lower() in other.lower()]
     hint = f"did you mean {close[0]!r}?" if close else f"names are {', '.join(names) or 'none'}"
     return error(f"unknown {kind} {name!r}", field=field, hint=hint)
 

@@ -6,6 +6,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from doorstate.cli import progress
+
+
+@pytest.fixture(autouse=True)
+def _no_progress_lines(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A busy machine must not add lines to standard error."""
+    monkeypatch.setattr(progress, "FIRST_LINE_S", 3600.0)
+
 
 @pytest.fixture
 def cloud() -> np.ndarray:

@@ -1,32 +1,47 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Progress bars and tables."""
+"""Tables, and text that must not be obeyed."""
 
 from __future__ import annotations
 
-import io
+import json
 
 import pytest
-from rich.console import Console
+from hypothesis import given
+from hypothesis import strategies as st
 
 from doorstate.cli import console
 
-
-def test_progress_bar_prints_nothing_without_a_terminal(capsys: pytest.CaptureFixture[str]) -> None:
-    with console.progress_bar("Working") as progress:
-        progress(1, 2)
-    assert capsys.readouterr() == ("", "")
-
-
-def test_progress_bar_is_drawn_on_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
-    screen = Console(file=io.StringIO(), force_terminal=True, width=80)
-    monkeypatch.setattr(console, "stderr", screen)
-    with console.progress_bar("Working") as progress:
-        progress(3, 7)
-    assert isinstance(screen.file, io.StringIO)
-    assert "Working" in screen.file.getvalue()
-    assert "3/7" in screen.file.getvalue()
+HOSTILE = "a\x1b[31m\x9b2J\x07\u202eb\udcff\n"
 
 
 def test_table_prints_markup_literally(capsys: pytest.CaptureFixture[str]) -> None:
     console.print_table("", ["file", "points"], [["[red]x", "12"]])
     assert "[red]x" in capsys.readouterr().out
+
+
+def test_terminal_escapes_are_printed_as_text(capsys: pytest.CaptureFixture[str]) -> None:
+    console.stdout.print(HOSTILE)
+    console.print_table(HOSTILE, ["file"], [[HOSTILE]])
+    out = capsys.readouterr().out
+    assert all(character.isprintable() or character == "\n" for character in out)
+    assert r"a\x1b[31m\x9b2J\x07\u202eb\udcff" in out
+
+
+def test_lines_are_not_wrapped(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "40")
+    line = "next: doorstate prepare " + "long/" * 30 + "folder --out x"
+    console.stdout.print(line)
+    assert capsys.readouterr().out == line + "\n"
+
+
+@given(st.text())
+def test_json_lines_are_printable_and_keep_the_text(text: str) -> None:
+    line = console.json_line({"file": text})
+    assert json.loads(line) == {"file": text}
+    assert not any(0x7F <= ord(c) <= 0x9F or ord(c) < 0x20 or 0xD800 <= ord(c) <= 0xDFFF for c in line)
+
+
+@pytest.mark.parametrize("name", ["=SUM(A1).npy", "+1.npy", "-x.npy", "@a.npy"])
+def test_file_names_are_no_formulas(name: str) -> None:
+    assert console.csv_name(name) == f"./{name}"
+    assert console.csv_name("a/" + name) == "a/" + name

@@ -131,7 +131,7 @@ def test_state_folders_give_the_same_files_twice(recordings: Path, run: Run, tmp
         (("--group", "building"), 2, "building"),
         (("--rule", "plane_state", "--rule", "plane_state"), 2, "plane_state"),
         (("--rule", "guess"), 2, "guess"),
-        (("--network", "nobody"), 1, "nobody"),
+        (("--network", "nobody"), 2, "nobody"),
         (("--layout", "kitti"), 2, "kitti"),
         (("--layout", "deepdoors2", "--roll", "90"), 2, "--layout"),
         (("--all",), 2, "--all"),

@@ -59,10 +59,9 @@ def faulty_bag(tmp_path: Path) -> Path:
 def test_table_has_a_row_for_each_message(predict: Run, weights: Path, bag: Path) -> None:
     code, out, err = predict("--bag", bag, "--topic", "/points", "--weights", weights)
     assert (code, err) == (0, "")
-    rows = [line.replace("│", " ").split() for line in out.splitlines() if "│ 17" in line]
+    rows = [line.split() for line in out.splitlines() if line.startswith("17")]
     assert [row[0] for row in rows] == STAMPS
     assert {row[1] for row in rows} <= set(STATES)
-    assert {row[5] for row in rows} == {"128"}
 
 
 def test_predictions_equal_those_of_the_cloud_in_a_file(
@@ -83,8 +82,9 @@ def test_csv_has_predictions_and_errors(
 ) -> None:
     table = tmp_path / "deep" / "states.csv"
     code, out, err = predict("--bag", faulty_bag, "--weights", weights, "--out", table)
-    assert (code, out) == (1, "")
-    assert err.count("\n") == 1
+    assert code == 1
+    assert out.count("\n") == err.count("\n") == 1
+    assert str(table) in out
     with table.open(newline="") as stream:
         rows = list(csv.DictReader(stream))
     assert [float(row["stamp_s"]) for row in rows] == [float(stamp) for stamp in STAMPS]
@@ -115,7 +115,7 @@ def test_errors_are_printed_beside_the_table(predict: Run, weights: Path, faulty
     assert code == 1
     assert err.partition(":")[0] == STAMPS[1]
     assert [stamp in out for stamp in STAMPS] == [True, False, True, True]
-    assert "none: " in out
+    assert " none " in out
 
 
 def test_predictions_before_damage_are_kept(predict: Run, weights: Path, tmp_path: Path) -> None:

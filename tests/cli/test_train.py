@@ -18,7 +18,7 @@ def test_pipeline_from_simulation_to_report(run: Run, tmp_path: Path) -> None:
     assert run("simulate", "--out", simulated, "--poses", 12, "--keep", "depth", "--workers", 1)[0] == 0
     assert run("prepare", simulated, "--out", clouds, "--points", 128, "--workers", 1)[0] == 0
     code, out, err = run(
-        *("compare", "--data", clouds, "--out", runs, "--networks", "pointnet,pointnet2", "--folds", 1),
+        *("compare", "--data", clouds, "--out", runs, "--network", "pointnet,pointnet2", "--folds", 1),
         *("--points", 128, *SMALL),
     )
     assert code == 0, err
@@ -38,7 +38,7 @@ def test_pipeline_from_simulation_to_report(run: Run, tmp_path: Path) -> None:
 def test_train_writes_one_run(run: Run, small_dataset: PreparedDataset, tmp_path: Path) -> None:
     folder = tmp_path / "run"
     code, _, err = run(
-        *("train", "pointcnn", "--data", small_dataset.folder, "--out", folder),
+        *("train", "--network", "pointcnn", "--data", small_dataset.folder, "--out", folder),
         *("--points", 128, "--fold", 1, *SMALL),
     )
     assert code == 0, err
@@ -50,7 +50,17 @@ def test_train_writes_one_run(run: Run, small_dataset: PreparedDataset, tmp_path
 def test_protocol_all_trains_on_all_clouds(run: Run, small_dataset: PreparedDataset, tmp_path: Path) -> None:
     folder = tmp_path / "run"
     code, _, err = run(
-        *("train", "pointnet", "--data", small_dataset.folder, "--protocol", "all", "--out", folder),
+        *(
+            "train",
+            "--network",
+            "pointnet",
+            "--data",
+            small_dataset.folder,
+            "--protocol",
+            "all",
+            "--out",
+            folder,
+        ),
         *("--points", 128, *SMALL),
     )
     assert code == 0, err
@@ -63,7 +73,7 @@ def test_resolution_measures_once(run: Run, simulated_folder: Path, tmp_path: Pa
     clouds, runs, study = tmp_path / "clouds", tmp_path / "runs", tmp_path / "study.toml"
     assert run("prepare", simulated_folder, "--out", clouds, "--points", 256, "--workers", 1)[0] == 0
     code, _, err = run(
-        *("compare", "--data", clouds, "--out", runs, "--networks", "pointnet", "--folds", 1),
+        *("compare", "--data", clouds, "--out", runs, "--network", "pointnet", "--folds", 1),
         *("--points", 256, *SMALL),
     )
     assert code == 0, err
@@ -84,7 +94,7 @@ def test_resolution_measures_once(run: Run, simulated_folder: Path, tmp_path: Pa
 def test_transfer_tests_on_another_data_set(run: Run, small_dataset: PreparedDataset, tmp_path: Path) -> None:
     runs, study, folder = tmp_path / "runs", tmp_path / "study.toml", tmp_path / "out"
     code, _, err = run(
-        *("compare", "--data", small_dataset.folder, "--out", runs, "--networks", "pointnet", "--folds", 1),
+        *("compare", "--data", small_dataset.folder, "--out", runs, "--network", "pointnet", "--folds", 1),
         *("--points", 128, *SMALL),
     )
     assert code == 0, err

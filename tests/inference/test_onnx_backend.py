@@ -44,7 +44,7 @@ def weights(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def exported(weights: Path) -> Path:
     """Made by the command in a process of its own, as users make it."""
     path = weights.with_suffix(".onnx")
-    arguments = ["export", "pointnet", "--weights", weights, "--out", path, "--clouds", "3"]
+    arguments = ["export", "--weights", weights, "--out", path, "--clouds", "3"]
     call = [sys.executable, "-c", "from doorstate.cli import main; main()", *map(str, arguments)]
     done = subprocess.run(call, text=True, capture_output=True)
     assert (done.returncode, done.stderr) == (0, "")
@@ -139,7 +139,7 @@ def test_missing_packages_of_export_are_named(
 ) -> None:
     monkeypatch.setitem(sys.modules, "onnxscript", None)
     out = tmp_path / "x.onnx"
-    code, _, err = run("export", "pointnet", "--weights", weights, "--out", out, "--clouds", 3)
+    code, _, err = run("export", "--weights", weights, "--out", out, "--clouds", 3)
     assert (code, out.exists()) == (1, False)
     assert "pip install onnx onnxscript onnxruntime" in err
     assert err.count("\n") == 1

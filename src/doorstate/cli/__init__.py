@@ -2,22 +2,21 @@
 """Command line `doorstate`: one module a command, each of which parses, calls the library and prints.
 
 Modules that take long to import are imported inside the commands, so that `--help` is quick.
-Exit codes: 0 success, 1 failure (one line on standard error), 2 wrong usage, 130 interrupted.
+Exit codes: docs/commands.md.
 """
 
 from __future__ import annotations
 
-import sys
 from typing import Annotated
 
 import typer
 
 from doorstate import __version__
+from doorstate.cli.command import Command, reported_errors
 from doorstate.cli.compare import compare
 from doorstate.cli.evaluate import evaluate
 from doorstate.cli.export import export
 from doorstate.cli.export_sdf import export_sdf
-from doorstate.cli.flags import format_flag
 from doorstate.cli.info import info
 from doorstate.cli.join import join
 from doorstate.cli.predict import predict
@@ -29,7 +28,6 @@ from doorstate.cli.simulate import simulate
 from doorstate.cli.train import train
 from doorstate.cli.transfer import transfer
 from doorstate.cli.view import view
-from doorstate.errors import ConfigError, DoorstateError
 
 _COMMANDS = (
     simulate,
@@ -48,7 +46,6 @@ _COMMANDS = (
     export_sdf,
     info,
 )
-_RESUMABLE = {"simulate", "prepare", "train", "compare", "resolution", "transfer"}
 
 app = typer.Typer(
     name="doorstate",
@@ -60,7 +57,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
 )
 for command in _COMMANDS:
-    app.command()(command)
+    app.command(cls=Command)(command)
 
 
 def _print_version(requested: bool) -> None:
@@ -80,13 +77,6 @@ def _options(
 
 
 def main() -> None:
-    """Run the command line, and print errors of this package as one line on standard error."""
-    try:
+    """Run the command line."""
+    with reported_errors():
         app()
-    except DoorstateError as error:
-        print(f"doorstate: {error.describe(format_flag)}", file=sys.stderr)  # noqa: T201
-        sys.exit(2 if isinstance(error, ConfigError) else 1)
-    except KeyboardInterrupt:
-        advice = "; run the same command again to continue" if _RESUMABLE & set(sys.argv[1:2]) else ""
-        print(f"doorstate: interrupted{advice}", file=sys.stderr)  # noqa: T201
-        sys.exit(130)

@@ -8,7 +8,21 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from doorstate.cli.options import Changes, Heads, Jobs, recipe_changes, split_names
+from doorstate.cli.choices import split_names
+from doorstate.cli.options import (
+    AsJson,
+    Changes,
+    ComparedNetworks,
+    Epochs,
+    HeadNames,
+    Jobs,
+    Protocol,
+    RecipeName,
+    RuleNames,
+    Seed,
+    TrainingPoints,
+    recipe_changes,
+)
 from doorstate.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -21,18 +35,17 @@ def compare(
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder of the comparison. [default: runs/NAME]")] = None,
     data: Annotated[Path | None, typer.Option(help="Prepared data set.")] = None,
-    protocol: Annotated[str | None, typer.Option(help="Split protocol: paper, by-pose or by-scene.")] = None,
-    networks: Annotated[
-        str | None, typer.Option(help="Networks, separated by commas. [default: the five of the paper]")
-    ] = None,
-    rules: Annotated[str | None, typer.Option(help="Rules, separated by commas. [default: none]")] = None,
+    protocol: Protocol = None,
+    network: ComparedNetworks = None,
+    rule: RuleNames = None,
     folds: Annotated[int | None, typer.Option(help="Number of folds to run.", min=1, max=5)] = None,
-    points: Annotated[int | None, typer.Option(help="Points of each cloud.", min=128)] = None,
-    seed: Annotated[int | None, typer.Option(help="Seed of the split and of training.", min=0)] = None,
-    recipe: Annotated[str | None, typer.Option(help="Training recipe: common or authors.")] = None,
-    epochs: Annotated[int | None, typer.Option(help="Epochs. [default: as in the recipe]", min=1)] = None,
-    heads: Heads = None,
+    points: TrainingPoints = None,
+    seed: Seed = None,
+    recipe: RecipeName = None,
+    epochs: Epochs = None,
+    head: HeadNames = None,
     changes: Changes = None,
+    as_json: AsJson = False,
     jobs: Jobs = 1,
 ) -> None:
     """Compare networks and rules by cross-validation.
@@ -42,10 +55,11 @@ def compare(
     \b
     Examples:
       doorstate compare paper/experiments/one-fold.toml
-      doorstate compare --data data/ogurob-4096 --protocol by-pose --networks pointnet,dgcnn --out runs/two
+      doorstate compare --data data/ogurob-4096 --network pointnet --network dgcnn --rule plane_state --out runs/three
     """
-    from doorstate.cli.console import print_table, stdout
+    from doorstate.cli.console import print_json, print_table, stdout
     from doorstate.dataset.splits import EVERYTHING
+    from doorstate.dataset.store import open_dataset
     from doorstate.training.experiment import load_experiment
 
     if experiment is None and data is None:
@@ -53,29 +67,35 @@ def compare(
     options: dict[str, Any] = {
         "dataset": None if data is None else str(data),
         "protocol": protocol,
-        "networks": split_names(networks),
-        "rules": split_names(rules),
+        "networks": tuple(split_names(network)) or None,
+        "rules": tuple(split_names(rule)) or None,
         "folds": folds,
         "num_points": points,
         "seed": seed,
         "recipe": recipe,
-        "heads": split_names(heads),
+        "heads": tuple(split_names(head)) or None,
     }
     overrides = {name: value for name, value in options.items() if value is not None}
-    if experiment is None:
+    changed = recipe_changes(changes, epochs)
+    if experiment is None and data is not None:
         overrides.setdefault("name", out.name if out else "comparison")
-    settings = load_experiment(experiment, overrides | {"recipe_changes": recipe_changes(changes, epochs)})
+        overrides.setdefault("num_points", open_dataset(data).num_points)
+    settings = load_experiment(experiment, overrides | {"recipe_changes": changed})
     folder = out or Path("runs") / settings.name
     metrics = compare_with_display(settings, folder, jobs)
+    if as_json:
+        for run in metrics:
+            print_json(run)
+        return
     if settings.protocol == EVERYTHING:
-        stdout.print(f"trained on all samples, no test; weights are in {folder / 'runs'}", soft_wrap=True)
+        stdout.print(f"trained on all samples, no test; weights are in {folder / 'runs'}")
         return
     print_table(
         f"{settings.name}: macro-F1 on the test folds (protocol {settings.protocol}, {settings.num_points} points)",
         ["method", *(f"fold {fold}" for fold in range(settings.folds)), "mean"],
         [_score_row(method, metrics) for method in settings.methods],
     )
-    stdout.print(f"next: doorstate report {folder}", soft_wrap=True)
+    stdout.print(f"next: doorstate report {folder}")
 
 
 def compare_with_display(experiment: Experiment, folder: Path, jobs: int) -> list[dict[str, Any]]:

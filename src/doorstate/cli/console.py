@@ -1,56 +1,70 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Consoles, progress bars and tables of the command line."""
+"""Consoles and tables of the command line: what a file name holds is printed, not obeyed."""
 
 from __future__ import annotations
 
+import json
+import re
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
 from rich.table import Table
+from rich.text import Text
 
 _PLAIN: dict[str, Any] = {"highlight": False, "markup": False, "emoji": False}  # file names may hold [ and :
 _PIPE_WIDTH = 160  # characters; piped tables must not be folded to a narrow default
-stdout = Console(**_PLAIN)
-stderr = Console(stderr=True, **_PLAIN)
+_NOT_IN_JSON = re.compile("[\x7f-\x9f\u200b-\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
 
 
-@contextmanager
-def progress_bar(description: str) -> Iterator[Callable[[int, int], None]]:
-    """Show a bar on standard error, if that is a terminal; yields `update(done, total)`."""
-    with Progress(
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(compact=True),
-        console=stderr,
-        transient=not stderr.is_terminal,
-        disable=not stderr.is_terminal,
-    ) as progress:
-        task = progress.add_task(description, total=None)
+def printable(text: str) -> str:
+    """Return text with control characters, terminal escapes and broken characters written as escape sequences."""
+    return "".join(
+        character
+        if character.isprintable() or character == "\n"
+        else character.encode("unicode_escape").decode("ascii")
+        for character in text
+    )
 
-        def update(done: int, total: int) -> None:
-            progress.update(task, completed=done, total=total)
 
-        yield update
+class PrintingConsole(Console):
+    """Console that prints lines as they are: not wrapped, without markup, and with nothing that a terminal obeys."""
+
+    def print(self, *objects: Any, **options: Any) -> None:
+        """Print as `rich.console.Console.print` does, with printable text only."""
+        super().print(*(printable(item) if isinstance(item, str) else item for item in objects), **options)
+
+    def on_broken_pipe(self) -> None:
+        """Leave it to `doorstate.cli.command` to end the program."""
+        raise BrokenPipeError
+
+
+stdout = PrintingConsole(**_PLAIN, soft_wrap=True)
+stderr = PrintingConsole(**_PLAIN, soft_wrap=True, stderr=True)
+
+
+def print_json(record: Mapping[str, Any]) -> None:
+    """Print one JSON object as a line on standard output, at once."""
+    print(json_line(record), flush=True)  # noqa: T201
+
+
+def json_line(record: Mapping[str, Any]) -> str:
+    """Return a JSON object in one line; characters that a terminal obeys are escaped, others are kept."""
+    text = json.dumps(record, ensure_ascii=False)
+    return _NOT_IN_JSON.sub(lambda match: f"\\u{ord(match[0]):04x}", text)
+
+
+def csv_name(name: str) -> str:
+    """Return a file name that a spreadsheet does not take for a formula; it still names the same file."""
+    return f"./{name}" if name[:1] in ("=", "+", "-", "@", "\t", "\r") else name
 
 
 def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     """Print a table on standard output; all columns but the first are aligned to the right."""
-    table = Table(title=title or None, title_justify="left")
+    table = Table(title=printable(title) or None, title_justify="left")
     for position, column in enumerate(columns):
         table.add_column(column, justify="left" if position == 0 else "right", overflow="fold")
     for row in rows:
-        table.add_row(*row)
-    Console(**_PLAIN, width=None if sys.stdout.isatty() else _PIPE_WIDTH).print(table)
+        table.add_row(*(Text(printable(cell)) for cell in row))
+    PrintingConsole(**_PLAIN, width=None if sys.stdout.isatty() else _PIPE_WIDTH).print(table)

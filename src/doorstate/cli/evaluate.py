@@ -3,22 +3,16 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from doorstate.cli.options import (
-    LayoutName,
-    PointCount,
-)
+from doorstate.cli.options import AsJson, LayoutName, NetworkNames, PointCount, RuleNames, WeightsFiles
 from doorstate.cli.reading_options import check_layout, with_reading_options
 from doorstate.errors import CloudReadError, ConfigError
 
 if TYPE_CHECKING:
-    from doorstate.evaluation.frames import Predictors
     from doorstate.io.options import ReadOptions
 
 _DOOR_COLUMN = "door"
@@ -32,13 +26,9 @@ def evaluate(
             help="Folder with an index.csv, with one sub-folder for each state, or with the layout of --layout."
         ),
     ],
-    network: Annotated[
-        list[str] | None, typer.Option(help="Name of packaged weights; repeatable. [default: pointnet2]")
-    ] = None,
-    weights: Annotated[
-        list[Path] | None, typer.Option(help="Weights file (.safetensors or .onnx); repeatable.")
-    ] = None,
-    rule: Annotated[list[str] | None, typer.Option(help="Name of a rule; repeatable.")] = None,
+    network: NetworkNames = None,
+    weights: WeightsFiles = None,
+    rule: RuleNames = None,
     points: PointCount = None,
     group: Annotated[
         str | None,
@@ -58,7 +48,7 @@ def evaluate(
     all_frames: Annotated[
         bool, typer.Option("--all", help="Show all frames in frames.html, not only errors.")
     ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the metrics as one JSON object.")] = False,
+    as_json: AsJson = False,
     layout: LayoutName = None,
     *,
     options: ReadOptions,
@@ -79,8 +69,10 @@ def evaluate(
       doorstate evaluate DeepDoors2 --layout deepdoors2 --weights mine.safetensors --by split --json
     """
     from doorstate._files import check_writable
-    from doorstate.cli.console import progress_bar, stderr
+    from doorstate.cli.console import print_json, stderr
     from doorstate.cli.evaluate_output import PAGE, print_scores, write_frame_report
+    from doorstate.cli.predictors import Methods, load_predictors
+    from doorstate.cli.progress import progress_bar
     from doorstate.dataset.labelled import check_column, labelled_frames
     from doorstate.evaluation.frame_tables import NO_GROUP, frame_notes, frame_tables
     from doorstate.evaluation.frames import evaluate_frames
@@ -95,49 +87,24 @@ def evaluate(
         check_column(frames, column.partition(":")[0])
     if out is not None:
         check_writable(out / PAGE)
-    predictors = _predictors(network, weights, rule, points)
+    predictors = load_predictors(Methods(network, weights, rule), points)
     with progress_bar("Predicting") as progress:
         results = evaluate_frames(predictors, frames, progress)
     for unreadable, reason in results.unreadable:
-        stderr.print(f"{unreadable.file}: {reason}", style="red", soft_wrap=True)
+        stderr.print(f"{unreadable.file}: {reason}", style="red")
     if not results.frames:
         raise CloudReadError(f"none of {len(frames)} files could be read", path=folder)
     scores = results.score(group, by or ())
     tables, notes = frame_tables(scores, group or NO_GROUP), frame_notes(scores, group or NO_GROUP)
     if as_json:
-        print(json.dumps(scores.to_json()))  # noqa: T201
+        print_json(scores.to_json())
     else:
         print_scores(tables, notes)
     if out is not None:
         page = write_frame_report(out, folder, predictors, results, scores, tables, notes, all_frames)
-        stderr.print(f"page: {page}", soft_wrap=True)
+        stderr.print(f"page: {page}")
     if results.unreadable:
         stderr.print(
             f"{len(results.unreadable)} of {len(frames)} files could not be read and are not counted"
         )
         raise typer.Exit(1)
-
-
-def _predictors(
-    networks: Sequence[str] | None,
-    weights: Sequence[Path] | None,
-    rules: Sequence[str] | None,
-    points: int | None,
-) -> Predictors:
-    """Return the predictors by name; the default network if none is given."""
-    from doorstate.cli.predictors import load_predictor
-    from doorstate.inference.predictor import DEFAULT_NETWORK
-
-    choices: list[tuple[str | None, Path | None, str | None]] = [
-        *((name, None, None) for name in networks or ()),
-        *((None, path, None) for path in weights or ()),
-        *((None, None, name) for name in rules or ()),
-    ] or [(DEFAULT_NETWORK, None, None)]
-    names = [rule or (path.stem if path else str(network)) for network, path, rule in choices]
-    if duplicates := [name for name in names if names.count(name) > 1]:
-        raise ConfigError(f"{duplicates[0]} is given twice: methods and weights files need different names")
-    mixed = networks or weights  # --points is for these; rules use all points
-    return {
-        name: load_predictor(network, path, rule, None if rule and mixed else points)
-        for name, (network, path, rule) in zip(names, choices, strict=True)
-    }

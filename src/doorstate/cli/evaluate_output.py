@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 
 from doorstate import __version__
 from doorstate._files import write_text
-from doorstate.cli.console import print_table, progress_bar, stdout
+from doorstate.cli.console import print_table, stdout
+from doorstate.cli.progress import progress_bar
 from doorstate.evaluation.tables import save_tables
 from doorstate.viewer.frame_page import choose_frames, make_cards, render_frame_page
 
@@ -25,11 +26,11 @@ PAGE = "frames.html"
 def print_scores(tables: Mapping[str, Table], notes: Sequence[str]) -> None:
     """Print notes and tables on standard output."""
     for note in notes:
-        stdout.print(note, soft_wrap=True)
+        stdout.print(note)
     for table in tables.values():
         print_table(table.title, table.columns, table.rows)
         if table.note:
-            stdout.print(table.note, soft_wrap=True)
+            stdout.print(table.note)
 
 
 def write_frame_report(

@@ -40,4 +40,4 @@ def export_sdf(
     for sample in samples:
         world = sdf_world(unflatten(rows[sample]), sample)
         write_text(out / f"{sample}.sdf", world)
-        stdout.print(f"{out / sample}.sdf", soft_wrap=True)
+        stdout.print(f"{out / sample}.sdf")

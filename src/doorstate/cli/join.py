@@ -23,4 +23,4 @@ def join(
     from doorstate.dataset.join import join_datasets
 
     joined = join_datasets(sources, out)
-    stdout.print(f"{len(joined)} clouds of {joined.num_points} points in {out}", soft_wrap=True)
+    stdout.print(f"{len(joined)} clouds of {joined.num_points} points in {out}")

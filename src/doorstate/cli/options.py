@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Options that several commands share."""
+"""Options that several commands share: one name means the same everywhere."""
 
 from __future__ import annotations
 
@@ -9,26 +9,37 @@ from typing import Annotated, Any
 
 import typer
 
+from doorstate.cli.choices import HEAD, LAYOUT, NETWORK, PACKAGED, PROTOCOL, RECIPE, RULE
 from doorstate.errors import ConfigError
 
-LayoutName = Annotated[
-    str | None,
-    typer.Option("--layout", help="Folder layout of a published data set: deepdoors2 (or DeepDoors)."),
+# Networks and rules that predict.
+NetworkNames = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--network",
+        parser=PACKAGED,
+        metavar="NAME",
+        help="Packaged weights: {packaged}; repeatable if several make sense. [default: pointnet2]",
+    ),
 ]
-
-# The network or rule that predicts.
-Network = Annotated[
-    str | None,
-    typer.Option(help="Name of packaged weights (doorstate info lists them). [default: pointnet2]"),
+WeightsFiles = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--weights", metavar="FILE", help="Weights file (.safetensors or .onnx), in place of --network."
+    ),
 ]
-Weights = Annotated[
-    Path | None, typer.Option(help="Weights file (.safetensors or .onnx), instead of --network.")
-]
-RuleName = Annotated[
-    str | None, typer.Option(help="Name of a rule (doorstate info lists them), instead of a network.")
+RuleNames = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--rule",
+        parser=RULE,
+        metavar="NAME",
+        help="Rule in place of a network: {rules}; repeatable.",
+    ),
 ]
 PointCount = Annotated[
-    int | None, typer.Option(help="Points that the network gets. [default: as trained]", min=128)
+    int | None,
+    typer.Option("--points", help="Points that the network gets. [default: as trained]", min=128),
 ]
 BudgetMs = Annotated[
     float | None,
@@ -37,6 +48,7 @@ BudgetMs = Annotated[
         min=1,
     ),
 ]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, one object a line, in place of a table.")]
 
 # Recordings.
 Bag = Annotated[
@@ -50,9 +62,15 @@ CameraInfoTopic = Annotated[
     str | None,
     typer.Option(help="CameraInfo topic of a depth image topic. [default: camera_info in its namespace]"),
 ]
+LayoutName = Annotated[
+    str | None,
+    typer.Option(
+        "--layout", parser=LAYOUT, metavar="NAME", help="Folder layout of a published data set: {layouts}."
+    ),
+]
 
-# Data sets and training.
-PreparedPoints = Annotated[int, typer.Option(help="Points of each prepared cloud.", min=128)]
+# Data sets.
+PreparedPoints = Annotated[int, typer.Option("--points", help="Points of each prepared cloud.", min=128)]
 MaxDepth = Annotated[
     float | None,
     typer.Option("--max-depth-m", help="Drop points farther ahead than this, in metres.", min=0.5),
@@ -68,16 +86,51 @@ ShardOption = Annotated[
     typer.Option(help="Process only this part of the work, such as 2/8; without it, all parts are joined."),
 ]
 Workers = Annotated[int | None, typer.Option(help="Worker processes. [default: one a processor]", min=1)]
+
+# Training.
+TrainedNetwork = Annotated[
+    str, typer.Option("--network", parser=NETWORK, metavar="NAME", help="Network to train: {networks}.")
+]
+ComparedNetworks = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--network",
+        parser=NETWORK,
+        metavar="NAME",
+        help="Network to train: {networks}; repeatable. [default: the five of the paper]",
+    ),
+]
+TrainingPoints = Annotated[
+    int | None, typer.Option("--points", help="Points of each cloud. [default: all of the data]", min=128)
+]
+Protocol = Annotated[
+    str | None,
+    typer.Option(
+        "--protocol", parser=PROTOCOL, metavar="NAME", help="Split protocol: {protocols}. [default: paper]"
+    ),
+]
+RecipeName = Annotated[
+    str | None,
+    typer.Option(
+        "--recipe", parser=RECIPE, metavar="NAME", help="Training recipe: {recipes}. [default: common]"
+    ),
+]
+Seed = Annotated[
+    int | None, typer.Option("--seed", help="Seed of the split and of training. [default: 0]", min=0)
+]
+Epochs = Annotated[int | None, typer.Option("--epochs", help="Epochs. [default: as in the recipe]", min=1)]
 Jobs = Annotated[int, typer.Option(help="Number of runs at the same time.", min=1)]
 Changes = Annotated[
     list[str] | None,
-    typer.Option("--set", help="Change a field of the recipe, such as --set batch_size=32; repeatable."),
-]
-Heads = Annotated[
-    str | None,
     typer.Option(
-        help="Heads besides the state, separated by commas: door, angle, hinge, frame, widths, parts."
+        "--set",
+        metavar="FIELD=VALUE",
+        help="Change a field of the recipe, such as --set batch_size=32; repeatable.",
     ),
+]
+HeadNames = Annotated[
+    list[str] | None,
+    typer.Option("--head", parser=HEAD, metavar="NAME", help="Head besides the state: {heads}; repeatable."),
 ]
 
 
@@ -89,11 +142,6 @@ def check_source(files: list[Path] | None, bag: Path | None) -> None:
     """
     if bool(files) == (bag is not None):
         raise ConfigError("give either files or --bag")
-
-
-def split_names(text: str | None) -> tuple[str, ...] | None:
-    """Return names that are separated by commas."""
-    return None if text is None else tuple(name.strip() for name in text.split(",") if name.strip())
 
 
 def recipe_changes(settings: list[str] | None, epochs: int | None) -> dict[str, Any]:
@@ -109,6 +157,6 @@ def recipe_changes(settings: list[str] | None, epochs: int | None) -> dict[str, 
             raise ConfigError(f"--set {setting}: expected FIELD=VALUE")
         try:
             changes[name.strip()] = tomllib.loads(f"value = {value}")["value"]
-        except tomllib.TOMLDecodeError:
+        except (tomllib.TOMLDecodeError, ValueError, RecursionError):
             changes[name.strip()] = value.strip()
     return changes

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from functools import partial
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,23 +11,25 @@ import typer
 
 from doorstate.cli.flags import format_flag
 from doorstate.cli.options import (
+    AsJson,
     Bag,
     BudgetMs,
     CameraInfoTopic,
-    Network,
+    NetworkNames,
     PointCount,
-    RuleName,
+    RuleNames,
     Topic,
-    Weights,
+    WeightsFiles,
     check_source,
 )
-from doorstate.cli.prediction_output import WRITERS, open_output
+from doorstate.cli.prediction_output import WRITERS, Output, Rows
 from doorstate.cli.reading_options import with_reading_options
-from doorstate.errors import ConfigError, DoorstateError
+from doorstate.errors import CloudReadError, ConfigError, DoorstateError
 
 if TYPE_CHECKING:
     from doorstate.inference.predictor import Predictor
     from doorstate.io.options import ReadOptions
+    from doorstate.types import Points
 
 
 @with_reading_options
@@ -35,12 +37,12 @@ def predict(
     files: Annotated[
         list[Path] | None, typer.Argument(help="Clouds, depth images, or folders of them.")
     ] = None,
-    network: Network = None,
-    weights: Weights = None,
-    rule: RuleName = None,
+    network: NetworkNames = None,
+    weights: WeightsFiles = None,
+    rule: RuleNames = None,
     points: PointCount = None,
     budget_ms: BudgetMs = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object a line.")] = False,
+    as_json: AsJson = False,
     bag: Bag = None,
     topic: Topic = None,
     camera_info_topic: CameraInfoTopic = None,
@@ -54,22 +56,22 @@ def predict(
     """Predict the state of the door in clouds.
 
     Clouds come from files, depth images or the messages of a ROS bag. Files: .pcd .ply .npy .npz .xyz .txt .csv,
-    depth .png. The exit code is 1 if there was no prediction for a file or message.
+    depth .png. Several networks and rules answer side by side. The exit code is 1 if a file or message could not be
+    predicted; all others are, and --out is written.
 
     \b
     Examples:
       doorstate predict cloud.pcd
       doorstate predict --frame optical --json recordings/
       doorstate predict recordings/ --out states.csv
-      doorstate predict --rule plane_state cloud.pcd
+      doorstate predict --network pointnet2 --rule plane_state --rule angle_bins cloud.pcd
       doorstate predict --network ogurob-dgcnn --budget-ms 33 recordings/
       doorstate predict depth.png --fx 385.9 --fy 385.4 --cx 317.8 --cy 243.7
       doorstate predict depth.png --intrinsics camera_info.yaml --roll 90
       doorstate predict --bag run.bag --topic /camera/depth/points --frame optical --out run.csv
     """
     from doorstate.cli.predict_bag import predict_bag
-    from doorstate.cli.predictors import load_predictor
-    from doorstate.io.find import find_clouds
+    from doorstate.cli.predictors import Methods, load_predictors
 
     check_source(files, bag)
     if bag is None and (topic, camera_info_topic, every) != (None, None, 1):
@@ -78,42 +80,70 @@ def predict(
         raise ConfigError("--json cannot be combined with --out; a .jsonl file holds JSON lines")
     if out is not None and out.suffix not in WRITERS:
         raise ConfigError(f"--out {out}: expected a {' or '.join(WRITERS)} file")
-    paths = find_clouds(files or [])
-    load = partial(load_predictor, network, weights, rule, points, budget_ms=budget_ms)
-    if bag is None:
-        _predict_files(load(), paths, options, out, as_json)
-    else:
-        predict_bag(load, bag, options, topic, camera_info_topic, every, out, as_json)
+    methods = Methods(network, weights, rule)
+    if bag is not None:
+        output = Output("stamp_s", "message", out, as_json)
+        # The predictor is loaded after the bag was opened, because it takes longer.
+        predict_bag(
+            lambda: load_predictors(methods, points, budget_ms=budget_ms),
+            bag,
+            options,
+            topic,
+            camera_info_topic,
+            every,
+            output,
+        )
+        return
+    sources = _find(files or [])
+    predictors = load_predictors(methods, points, budget_ms=budget_ms)
+    clouds = (_predict_file(predictors, source, options) for source in sources)
+    names = [_name(source) for source in sources if isinstance(source, Path)]
+    Output("file", "file", out, as_json).write(clouds, list(predictors), names, len(sources))
 
 
-def _predict_files(
-    predictor: Predictor,
-    paths: list[Path],
-    options: ReadOptions,
-    out: Path | None,
-    as_json: bool,
-) -> None:
-    from doorstate.cli.console import progress_bar, stderr
+def _find(paths: list[Path]) -> list[Path | CloudReadError]:
+    """Return the files, and the errors of arguments without any; a single argument must have one."""
+    from doorstate.io.find import find_clouds
 
-    failures = 0
-    with open_output("file", out, as_json) as write, progress_bar("Predicting") as progress:
-        for number, path in enumerate(paths, 1):
-            row = _predict_file(predictor, path, options)
-            failures += "error" in row
-            write(row)
-            progress(number, len(paths))
-    if failures:
-        stderr.print(f"no prediction for {failures} of {len(paths)} files")
-        raise typer.Exit(1)
+    if len(paths) == 1:
+        return [*find_clouds(paths)]
+    found: list[Path | CloudReadError] = []
+    for path in paths:
+        try:
+            found += find_clouds([path])
+        except CloudReadError as error:
+            found.append(error)
+    return found
 
 
-def _predict_file(predictor: Predictor, path: Path, options: ReadOptions) -> dict[str, Any]:
-    from doorstate.inference.serialization import prediction_to_dict, require_points
+def _predict_file(
+    predictors: Mapping[str, Predictor], source: Path | CloudReadError, options: ReadOptions
+) -> Rows:
     from doorstate.io.readers import read_cloud
 
-    # A file name may hold bytes that are not text and cannot be printed.
-    row = {"file": str(path).encode(errors="backslashreplace").decode()}
+    if isinstance(source, CloudReadError):
+        return [
+            {"file": _name(Path(source.path or "")), "error": source.describe(format_flag, with_path=False)}
+        ]
+    row = {"file": _name(source)}
     try:
-        return row | prediction_to_dict(require_points(predictor(read_cloud(path, options))), format_flag)
+        return [*_predict(predictors, read_cloud(source, options), row)]
     except DoorstateError as error:
-        return row | {"error": error.describe(format_flag, with_path=False)}
+        return [row | {"error": error.describe(format_flag, with_path=False)}]
+    except MemoryError:
+        return [row | {"error": "not enough memory for this file"}]
+
+
+def _predict(
+    predictors: Mapping[str, Predictor], cloud: Points, row: dict[str, Any]
+) -> Iterator[dict[str, Any]]:
+    from doorstate.inference.serialization import prediction_to_dict, require_points
+
+    for method, predictor in predictors.items():
+        prediction = require_points(predictor(cloud))
+        yield row | {"method": method} | prediction_to_dict(prediction, format_flag)
+
+
+def _name(path: Path) -> str:
+    """Return a path as text; a file name may hold bytes that are not text."""
+    return str(path).encode(errors="backslashreplace").decode()

@@ -3,14 +3,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import typer
-
 from doorstate.cli.flags import format_flag
-from doorstate.cli.prediction_output import open_output
+from doorstate.cli.prediction_output import Output, Rows
 from doorstate.errors import CloudReadError, DoorstateError
 
 if TYPE_CHECKING:
@@ -20,45 +18,33 @@ if TYPE_CHECKING:
 
 
 def predict_bag(
-    load: Callable[[], Predictor],
+    load: Callable[[], Mapping[str, Predictor]],
     path: Path,
     options: ReadOptions,
     topic: str | None,
     camera_info_topic: str | None,
     every: int,
-    out: Path | None,
-    as_json: bool,
+    output: Output,
 ) -> None:
-    """Write a prediction for every Nth message of a topic.
+    """Write predictions for every Nth message of a topic.
 
     Args:
-        load: loads the predictor; called after the bag was opened, because it takes longer.
+        load: loads the predictors by name; called after the bag was opened, because it takes longer.
         path: bag.
         options: how clouds are read.
         topic: topic to read; None if there is only one.
         camera_info_topic: topic of the camera; None for the usual one.
         every: N.
-        out: file to write; None prints.
-        as_json: print JSON lines instead of a table.
+        output: where the predictions go.
     """
-    from doorstate.cli.console import progress_bar, stderr
     from doorstate.io.bags import open_bag
 
-    count = failures = 0
     with open_bag(path) as bag:
         chosen = bag.choose(topic)
-        predictor = load()
-        total = -(-chosen.messages // every)
+        predictors = load()
         messages = bag.clouds(chosen, options, camera_info_topic, every)
-        clouds = warn_about_frame(messages, chosen, options)
-        with open_output("stamp_s", out, as_json) as write, progress_bar("Predicting") as progress:
-            for count, row in enumerate(_rows(predictor, clouds), 1):
-                write(row)
-                failures += "error" in row
-                progress(count, total)
-    if failures:
-        stderr.print(f"no prediction for {failures} of {count} messages")
-        raise typer.Exit(1)
+        clouds = _predict_messages(predictors, warn_about_frame(messages, chosen, options))
+        output.write(clouds, list(predictors), [f"{0:.6f}".rjust(17)], -(-chosen.messages // every))
 
 
 def warn_about_frame(
@@ -71,12 +57,12 @@ def warn_about_frame(
     for number, message in enumerate(messages):
         if number == 0 and topic.type == CLOUD and options.frame == "body" and is_optical(message.frame_id):
             warning = f"{topic.name} is in frame {message.frame_id}: is --frame optical missing?"
-            stderr.print(warning, soft_wrap=True)
+            stderr.print(warning)
         yield message
 
 
-def _rows(predictor: Predictor, clouds: Iterable[StampedCloud]) -> Iterator[dict[str, Any]]:
-    """Yield a row for each message; a bag that is damaged from somewhere on ends with an error row."""
+def _predict_messages(predictors: Mapping[str, Predictor], clouds: Iterable[StampedCloud]) -> Iterator[Rows]:
+    """Yield the rows of each message; a bag that is damaged from somewhere on ends with an error row."""
     from doorstate.inference.serialization import prediction_to_dict
 
     try:
@@ -85,9 +71,11 @@ def _rows(predictor: Predictor, clouds: Iterable[StampedCloud]) -> Iterator[dict
             try:
                 if isinstance(cloud, DoorstateError):
                     raise cloud
-                row |= prediction_to_dict(predictor(cloud), format_flag)
+                yield [
+                    row | {"method": method} | prediction_to_dict(predictor(cloud), format_flag)
+                    for method, predictor in predictors.items()
+                ]
             except DoorstateError as error:
-                row["error"] = error.describe(format_flag, with_path=False)
-            yield row
+                yield [row | {"error": error.describe(format_flag, with_path=False)}]
     except CloudReadError as error:
-        yield {"stamp_s": None, "error": error.describe(format_flag)}
+        yield [{"stamp_s": None, "error": error.describe(format_flag)}]

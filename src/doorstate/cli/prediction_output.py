@@ -4,56 +4,90 @@
 from __future__ import annotations
 
 import csv
-import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any, NamedTuple, TextIO
 
+import typer
+
+from doorstate.cli.console import csv_name, json_line, print_json
+
+Rows = list[dict[str, Any]]
+"""Predictions of all methods for one cloud, or one row with its `error`; each names its cloud."""
 Write = Callable[[dict[str, Any]], None]
-"""Writes one row: a prediction or an `error`, and the name or time stamp of its cloud."""
 
 
-@contextmanager
-def open_output(key: str, out: Path | None, as_json: bool) -> Iterator[Write]:
-    """Yield a function that writes rows.
+class Output(NamedTuple):
+    """Where predictions go, and how their clouds are named."""
 
-    A file is written whole or not at all.
+    key: str  # field that names a cloud: `file`, or `stamp_s` of messages
+    noun: str
+    path: Path | None = None  # file to write
+    as_json: bool = False
 
-    Args:
-        key: field that identifies a row: `file`, or `stamp_s` of messages.
-        out: file to write, with a suffix of `WRITERS`; None prints on standard output.
-        as_json: print JSON lines instead of a table.
-    """
-    from doorstate._files import atomic_path
+    @property
+    def is_table(self) -> bool:
+        """True if a table is printed."""
+        return self.path is None and not self.as_json
 
-    if out is not None:
-        with atomic_path(out) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
-            yield WRITERS[out.suffix](stream, key)
-    elif as_json:
-        yield lambda row: print(json.dumps(row, ensure_ascii=False), flush=True)  # noqa: T201
-    else:
-        with _printed_table(key) as write:
-            yield write
+    def write(
+        self,
+        clouds: Iterable[Rows],
+        methods: Sequence[str],
+        names: Sequence[str] = (),
+        total: int = 0,
+    ) -> None:
+        """Write all rows and a summary; exit with code 1 if a cloud has no prediction.
 
+        Args:
+            clouds: rows of each cloud.
+            methods: names of the methods.
+            names: names of the clouds, as far as they are known.
+            total: number of clouds, for the progress.
+        """
+        from doorstate.cli.console import stdout
+        from doorstate.cli.prediction_summary import PredictionSummary
+        from doorstate.cli.progress import progress_bar
 
-@contextmanager
-def _printed_table(key: str) -> Iterator[Write]:
-    from doorstate.cli.console import print_table, stderr
-    from doorstate.types import STATES
-
-    rows: list[list[str]] = []
-
-    def write(row: dict[str, Any]) -> None:
-        name = _format_key(row[key])
-        if "error" in row:
-            stderr.print(f"{name}: {row['error']}", style="red", soft_wrap=True)
+        summary = PredictionSummary(self.noun)
+        hidden = self.is_table and stdout.is_terminal  # the rows show how far it is
+        with self._open(names, methods) as write, progress_bar("Predicting", hidden=hidden) as progress:
+            for done, rows in enumerate(clouds, 1):
+                for row in rows:
+                    write(row)
+                summary.add(_format_key(rows[0][self.key]), rows)
+                progress(done, total)
+        if self.as_json:
+            summary.print_failures()
         else:
-            rows.append([name, *_cells(row)])
+            summary.print_errors()
+            summary.print_counts(f"; written to {self.path}" if self.path else "")
+        if summary.failures:
+            raise typer.Exit(1)
 
-    yield write
-    if rows:
-        print_table("", [key.removesuffix("_s"), "state", *STATES, "points", "ms"], rows)
+    @contextmanager
+    def _open(self, names: Sequence[str], methods: Sequence[str]) -> Iterator[Write]:
+        """Yield a function that writes a row; a file is written whole or not at all."""
+        from doorstate._files import atomic_path
+        from doorstate.cli.prediction_table import PredictionTable
+
+        if self.path is not None:
+            with (
+                atomic_path(self.path) as temporary,
+                temporary.open("w", newline="", encoding="utf-8") as stream,
+            ):
+                yield WRITERS[self.path.suffix](stream, self.key)
+        elif self.as_json:
+            yield print_json
+        else:
+            table = PredictionTable(self.key.removesuffix("_s"), names, methods)
+
+            def write(row: dict[str, Any]) -> None:
+                if "error" not in row:
+                    table.add(_format_key(row[self.key]), row)
+
+            yield write
 
 
 def _format_key(value: str | float | None) -> str:
@@ -62,15 +96,9 @@ def _format_key(value: str | float | None) -> str:
     return value if isinstance(value, str) else f"{value:.6f}"
 
 
-def _cells(row: dict[str, Any]) -> list[str]:
-    state = row["state"] or f"none: {row['reason']}"
-    probabilities = [f"{probability:.3f}" for probability in row["probabilities"].values()]
-    return [state, *probabilities, str(row["points"]), f"{row['milliseconds']:.0f}"]
-
-
 def _json_writer(stream: TextIO, key: str) -> Write:
     def write(row: dict[str, Any]) -> None:
-        stream.write(json.dumps(row, ensure_ascii=False) + "\n")
+        stream.write(json_line(row) + "\n")
 
     return write
 
@@ -79,12 +107,14 @@ def _csv_writer(stream: TextIO, key: str) -> Write:
     from doorstate.inference.serialization import OPTIONAL_FIELDS
     from doorstate.types import STATES
 
-    columns = [key, "state", *STATES, "points", "milliseconds", *OPTIONAL_FIELDS, "reason", "error"]
+    columns = [key, "method", "state", *STATES, "points", "milliseconds", *OPTIONAL_FIELDS, "reason", "error"]
     writer = csv.DictWriter(stream, columns, lineterminator="\n")
     writer.writeheader()
 
     def write(row: dict[str, Any]) -> None:
-        flat = row | row.get("probabilities", {})
+        flat = row | (row.get("probabilities") or {})
+        if isinstance(flat[key], str):
+            flat[key] = csv_name(flat[key])
         writer.writerow({column: flat.get(column) for column in columns})
 
     return write

@@ -61,7 +61,8 @@ def prepare(
       doorstate prepare ~/OGUROB_DOORS --poses poses.csv --frame optical --out data/original
     """
     from doorstate._jobs import Shard
-    from doorstate.cli.console import progress_bar, stdout
+    from doorstate.cli.console import stdout
+    from doorstate.cli.progress import progress_bar
     from doorstate.clouds.preparation import CloudSpec
     from doorstate.dataset.preparation import Preparation
     from doorstate.dataset.prepare import prepare_dataset, prepare_shard
@@ -97,6 +98,6 @@ def print_summary(summary: PreparationSummary, out: Path, points: int) -> None:
         if not counts[state] and summary.dataset.description.kind == "imported":
             stderr.print(f"no clouds of state {state}: check the name of its folder")
     by_state = ", ".join(f"{count} {name}" for name, count in counts.items() if count or name != NO_DOOR)
-    stdout.print(f"{len(summary.dataset)} clouds of {points} points in {out} ({by_state})", soft_wrap=True)
+    stdout.print(f"{len(summary.dataset)} clouds of {points} points in {out} ({by_state})")
     if summary.rejected:
         raise typer.Exit(1)

@@ -33,7 +33,8 @@ def report(
       doorstate report runs/paper runs/related --out reports/all
       doorstate report data/ogurob-4096 --out reports/data
     """
-    from doorstate.cli.console import stderr, stdout
+    from doorstate.cli.console import stdout
+    from doorstate.cli.progress import working
     from doorstate.dataset.store import is_prepared
     from doorstate.evaluation.predictions import is_comparison
     from doorstate.evaluation.report import write_dataset_report, write_report
@@ -42,6 +43,6 @@ def report(
     if is_dataset and not is_prepared(folders[0]):
         raise DatasetError("neither a comparison nor a prepared data set", path=folders[0])
     target = out or folders[0] / "report"
-    with stderr.status("Writing the report"):
+    with working("Writing the report"):
         page = write_dataset_report(folders[0], target) if is_dataset else write_report(folders, target, data)
-    stdout.print(f"report: {page}", soft_wrap=True)
+    stdout.print(f"report: {page}")

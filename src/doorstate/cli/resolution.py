@@ -55,7 +55,7 @@ def _measure_latency(settings: ResolutionStudy, folder: Path) -> None:
     """Write the median time of each network with each number of points."""
     from doorstate._files import write_csv
     from doorstate._memory import keep_freed_memory
-    from doorstate.cli.console import progress_bar
+    from doorstate.cli.progress import progress_bar
     from doorstate.dataset.store import open_dataset
     from doorstate.evaluation.study import LATENCY
     from doorstate.inference.budget import median_milliseconds

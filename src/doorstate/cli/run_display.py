@@ -34,7 +34,7 @@ def live_runs(
     if not stderr.is_terminal:
 
         def print_line(done: int, total: int) -> None:
-            stderr.print(f"{done} of {total} runs finished{display.time_left()}", soft_wrap=True)
+            stderr.print(f"{done} of {total} runs finished{display.time_left()}")
 
         with _repeated(
             _LINE_PERIOD_S, lambda: print_line(sum(run.folder.finished for run in runs), len(runs))

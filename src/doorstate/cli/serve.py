@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from doorstate.cli.options import BudgetMs, Network, PointCount, RuleName, Weights
+from doorstate.cli.options import BudgetMs, NetworkNames, PointCount, RuleNames, WeightsFiles
 from doorstate.errors import missing_extra
 
 
@@ -18,9 +18,9 @@ def serve(
     port: Annotated[
         int, typer.Option(help="Port to listen on; 0 chooses a free one.", min=0, max=65535)
     ] = 8000,
-    network: Network = None,
-    weights: Weights = None,
-    rule: RuleName = None,
+    network: NetworkNames = None,
+    weights: WeightsFiles = None,
+    rule: RuleNames = None,
     points: PointCount = None,
     budget_ms: BudgetMs = None,
     max_megabytes: Annotated[
@@ -52,16 +52,16 @@ def serve(
     except ImportError as error:
         raise missing_extra("serve", "fastapi", "uvicorn") from error
     from doorstate._jobs import default_workers
-    from doorstate.cli.predictors import load_predictor
+    from doorstate.cli.predictors import Methods, load_predictor
 
     workers = workers or default_workers()
     limits = Limits(int(max_megabytes * 2**20), timeout_s, queue, workers)
     threads = max(1, default_workers() // workers)
-    if rule is None and (weights is None or weights.suffix != ".onnx"):
+    if not rule and not (weights and weights[0].suffix == ".onnx"):
         import torch
 
         torch.set_num_threads(threads)
-    predictor = load_predictor(network, weights, rule, points, budget_ms=budget_ms, threads=threads)
+    predictor = load_predictor(Methods(network, weights, rule), points, budget_ms=budget_ms, threads=threads)
     listener = listen(host, port)
     server = create_server(create_app(predictor, limits), timeout_s, verbose)
     address = f"[{host}]" if ":" in host else host

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from doorstate.cli.choices import PRESET, RAW_KIND, SENSOR, split_names
 from doorstate.cli.options import MaxDepth, PreparedPoints, ShardOption, Thin, Workers
 from doorstate.errors import ConfigError
 
@@ -17,8 +18,9 @@ def simulate(
     preset: Annotated[
         str,
         typer.Option(
-            help="One door seen from many poses: ogurob, ogurob-fixed, ogurob-away. Many scenes: varied, "
-            "varied-angles, cluttered, no-door."
+            parser=PRESET,
+            metavar="NAME",
+            help="Scenes: {presets}. The ogurob presets show one door from many poses, the others many rooms.",
         ),
     ] = "ogurob",
     poses: Annotated[
@@ -27,15 +29,18 @@ def simulate(
     scenes: Annotated[
         int | None, typer.Option(help="Number of scenes of the other presets. [default: 1000]", min=1)
     ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of all random numbers.", min=0)] = 0,
+    seed: Annotated[int, typer.Option("--seed", help="Seed of all random numbers.", min=0)] = 0,
     sensor: Annotated[
         str,
         typer.Option(
-            help="Noise model of the depth camera: none, gaussian, gaussian:METRES, xtion, kinect, d435 or deepdoors2."
+            parser=SENSOR,
+            metavar="NAME",
+            help="Noise of the depth camera: {sensors}; gaussian:0.02 has a standard deviation of 0.02 m.",
         ),
     ] = "none",
     keep: Annotated[
-        list[str] | None, typer.Option(help="Raw files to write: pcd, depth or image; repeatable.")
+        list[str] | None,
+        typer.Option(parser=RAW_KIND, metavar="NAME", help="Raw files to write: {raw_kinds}; repeatable."),
     ] = None,
     workers: Workers = None,
     shard: ShardOption = None,
@@ -62,18 +67,17 @@ def simulate(
       doorstate simulate --preset varied --sensor d435 --out data/d435 --prepared data/d435-4096 --thin --max-depth-m 5
     """
     from doorstate._jobs import Shard
-    from doorstate.cli.console import progress_bar, stderr, stdout
+    from doorstate.cli.console import stderr, stdout
     from doorstate.cli.prepare import print_summary
+    from doorstate.cli.progress import progress_bar
     from doorstate.clouds.preparation import CloudSpec
     from doorstate.dataset.preparation import Preparation
     from doorstate.dataset.simulated import Sampler, simulate_prepared
     from doorstate.simulation.settings import RAW_KINDS, settings_for
     from doorstate.simulation.writer import simulate_dataset, simulate_shard
 
-    unknown = [kind for kind in keep or [] if kind not in RAW_KINDS]
-    if unknown:
-        raise ConfigError(f"--keep {unknown[0]}: expected one of {', '.join(RAW_KINDS)}")
-    kinds = tuple(kind for kind in RAW_KINDS if kind in (keep or []))
+    kept = split_names(keep)
+    kinds = tuple(kind for kind in RAW_KINDS if kind in kept)
     settings = settings_for(preset, seed, poses, scenes, kinds, sensor)
     preparation = Preparation(out, CloudSpec(num_points=points, thin=thin, max_depth_m=max_depth))
     if prepared is None and preparation != Preparation(out):

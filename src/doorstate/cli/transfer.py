@@ -44,4 +44,4 @@ def transfer(
     scores = score_transfer(results, tuple(settings.trained), tuple(settings.tested))
     table = transfer_table(scores)
     print_table(table.title, table.columns, table.rows)
-    stdout.print(f"tables and figure: {write_transfer(scores, folder / 'report')}", soft_wrap=True)
+    stdout.print(f"tables and figure: {write_transfer(scores, folder / 'report')}")

@@ -14,11 +14,11 @@ import typer
 from doorstate.cli.options import (
     Bag,
     CameraInfoTopic,
-    Network,
+    NetworkNames,
     PointCount,
-    RuleName,
+    RuleNames,
     Topic,
-    Weights,
+    WeightsFiles,
     check_source,
 )
 from doorstate.cli.reading_options import with_reading_options
@@ -42,9 +42,9 @@ def view(
             help="Clouds, depth images, folders of them, simulated folders or prepared data sets."
         ),
     ] = None,
-    network: Network = None,
-    weights: Weights = None,
-    rule: RuleName = None,
+    network: NetworkNames = None,
+    weights: WeightsFiles = None,
+    rule: RuleNames = None,
     points: PointCount = None,
     out: Annotated[
         Path | None, typer.Option(help="Write the page to this .html file, without opening a browser.")
@@ -87,7 +87,7 @@ def view(
       doorstate view --live incoming/ --port 8080 --no-open
     """
     from doorstate._files import check_writable
-    from doorstate.cli.predictors import load_predictor
+    from doorstate.cli.predictors import Methods, load_predictor
     from doorstate.cli.view_output import show_live, show_page
 
     check_source(files, bag)
@@ -109,7 +109,7 @@ def view(
     else:
         source = nullcontext(_find_files(files or [], options, every))
     with source as (clouds, total):
-        predictor = load_predictor(network, weights, rule, points)
+        predictor = load_predictor(Methods(network, weights, rule), points)
         if live:
             show_live(predictor, clouds, port, open_browser)
         else:

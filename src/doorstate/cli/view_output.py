@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from doorstate.cli.console import progress_bar, stderr
+from doorstate.cli.console import stderr
 from doorstate.cli.flags import format_flag
+from doorstate.cli.progress import progress_bar
 
 if TYPE_CHECKING:
     from doorstate.inference.predictor import Predictor
@@ -48,7 +49,7 @@ def show_page(
             entry = make_entry(predictor, cloud, format_flag)
             if "error" in entry:
                 failures += 1
-                stderr.print(f"{entry['name']}: {entry['error']}", style="red", soft_wrap=True)
+                stderr.print(f"{entry['name']}: {entry['error']}", style="red")
             entries.append(entry)
             progress(len(entries), total)
     if failures < len(entries):
@@ -59,7 +60,6 @@ def show_page(
         if len(page) > _LARGE_PAGE_BYTES:
             stderr.print(
                 f"the page has {len(page) / 1e6:.0f} MB and opens slowly: use --every or fewer --points",
-                soft_wrap=True,
             )
         if out is None and open_browser:
             _open_in_browser(path.absolute().as_uri())
@@ -98,4 +98,4 @@ def show_live(predictor: Predictor, clouds: Iterable[NamedCloud], port: int, ope
 
 def _open_in_browser(address: str) -> None:
     if not webbrowser.open(address):
-        stderr.print(f"no browser found; open {address}", soft_wrap=True)
+        stderr.print(f"no browser found; open {address}")

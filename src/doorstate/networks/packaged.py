@@ -8,12 +8,12 @@ from pathlib import Path
 
 from doorstate.errors import WeightsError, unknown_name
 
-_FOLDER = Path(str(resources.files("doorstate.networks"))) / "pretrained"
+PRETRAINED = Path(str(resources.files("doorstate.networks"))) / "pretrained"
 
 
 def packaged_networks() -> list[str]:
     """Return the names of the packaged weights, sorted."""
-    return sorted(path.stem for path in _FOLDER.glob("*.safetensors"))
+    return sorted(path.stem for path in PRETRAINED.glob("*.safetensors"))
 
 
 def packaged_weights(name: str) -> Path:
@@ -22,7 +22,7 @@ def packaged_weights(name: str) -> Path:
     Raises:
         WeightsError: no packaged weights of this name.
     """
-    path = _FOLDER / f"{name}.safetensors"
+    path = PRETRAINED / f"{name}.safetensors"
     if not path.is_file():
         raise unknown_name("packaged weights", name, packaged_networks(), WeightsError)
     return path

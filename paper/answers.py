@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How often packaged weights answer, and how often rightly: on clean frames, simulated doors and recorded frames."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from doorstate._files import write_text
+from doorstate._jobs import Progress
+from doorstate.inference.network_predictor import NetworkPredictor
+from doorstate.inference.predictor import Predictor
+from doorstate.io.camera import Intrinsics
+from doorstate.io.depth import depth_to_points
+from doorstate.networks.answers import ANSWERS_FILE, AnswerCount
+from doorstate.simulation.frames import level, replay
+from doorstate.simulation.presets import PRESETS, draw_rows
+from doorstate.training.run_folder import read_json
+from doorstate.types import NO_DOOR, STATES, Points
+
+from . import paths
+from .pages.real import read_frames
+
+SEED = 1_000_003  # of no data set
+GAZEBO = paths.REPOSITORY / "tests" / "fixtures" / "gazebo"
+Example = tuple[str, Points]
+"""True state and cloud."""
+
+
+def write_answers(names: Iterable[str], count: int, progress: Progress) -> Path:
+    """Measure weights and write the counts beside them; other weights in the file stay.
+
+    Args:
+        names: packaged weights.
+        count: number of simulated doors.
+        progress: called after each cloud.
+    """
+    path = paths.PRETRAINED / ANSWERS_FILE
+    counts: dict[str, Any] = read_json(path) if path.is_file() else {}
+    for name in names:
+        predictor = NetworkPredictor.from_weights(name)
+        presets = trained_presets(predictor.card.trained_on)
+        measured = {
+            "clean": count_answers(predictor, gazebo_frames(), progress),
+            "simulated": count_answers(predictor, simulated_doors(presets, count), progress),
+            "recorded": recorded_answers(paths.PRETRAINED / f"{name}.safetensors"),
+        }
+        counts[name] = {key: value.model_dump() for key, value in measured.items() if value is not None}
+    write_text(path, json.dumps(dict(sorted(counts.items())), indent=2) + "\n")
+    return path
+
+
+def count_answers(predictor: Predictor, examples: Iterable[Example], progress: Progress) -> AnswerCount:
+    """Count answers and right ones."""
+    results = []
+    for done, (state, cloud) in enumerate(examples, 1):
+        prediction = predictor(cloud)
+        results.append(
+            (prediction.state is not None, prediction.state is not None and prediction.state.label == state)
+        )
+        progress(done, done)
+    return AnswerCount(
+        frames=len(results),
+        answered=sum(answered for answered, _ in results),
+        right=sum(right for _, right in results),
+    )
+
+
+def gazebo_frames() -> Iterator[Example]:
+    """Yield the twenty frames without noise that Gazebo rendered."""
+    with np.load(GAZEBO / "depth.npz") as stored:
+        depth_m = stored["depth"]
+    for image, frame in zip(
+        depth_m, json.loads((GAZEBO / "scenes.json").read_text(encoding="utf-8")), strict=True
+    ):
+        camera = frame["intrinsics"]
+        intrinsics = Intrinsics(
+            camera["width"], camera["height"], camera["f"], camera["f"], camera["cx"], camera["cy"]
+        )
+        yield frame["state"], level(depth_to_points(image, intrinsics), frame["camera"]["pitch"])
+
+
+def trained_presets(trained_on: str) -> list[str]:
+    """Return the presets with a door among the data sets of a card, such as `varied + cluttered + no-door, ...`."""
+    names = [name.strip() for name in trained_on.partition(",")[0].split("+")]
+    return [name for name in names if name in PRESETS and name != NO_DOOR.replace("_", "-")]
+
+
+def simulated_doors(presets: list[str], count: int) -> Iterator[Example]:
+    """Yield doors in all states that no weights were trained on, an equal number of each preset."""
+    for preset in presets:
+        poses = PRESETS[preset].indices(-(-count // len(presets) // len(STATES)))
+        for pose in poses:
+            for row in draw_rows(PRESETS[preset], SEED, pose):
+                yield row.state, replay(row).points
+
+
+def recorded_answers(weights: Path) -> AnswerCount | None:
+    """Return the published counts on recorded frames with a door; None if these weights were not tested on them."""
+    import hashlib
+
+    digest = hashlib.sha256(weights.read_bytes()).hexdigest()
+    tested = read_json(paths.RESULTS / "real" / "experiment.json")["weights"]
+    method = next((entry["experiment"] for entry in tested if digest.startswith(entry["sha256"])), None)
+    if method is None:
+        return None
+    rows = read_frames()
+    rows = rows[(rows["method"] == method) & rows["state"].isin(STATES)]
+    return AnswerCount(
+        frames=len(rows), answered=int(rows["predicted"].isin(STATES).sum()), right=int(rows["correct"].sum())
+    )

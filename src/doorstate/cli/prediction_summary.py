@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Summary of `doorstate predict`: counts of the states, and alike errors as one line."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from statistics import median
+from typing import Any
+
+from doorstate.cli.console import stderr, stdout
+from doorstate.types import STATES
+
+
+class PredictionSummary:
+    """Counts predictions and failures.
+
+    Args:
+        noun: what is predicted on, such as "file".
+    """
+
+    def __init__(self, noun: str) -> None:
+        self._noun = noun
+        self._clouds = 0
+        self._states: dict[str, Counter[str | None]] = {}
+        self._milliseconds: dict[str, list[float]] = {}
+        self._errors: dict[str, list[tuple[str, str]]] = {}
+
+    @property
+    def failures(self) -> int:
+        """Number of clouds without a prediction."""
+        return sum(map(len, self._errors.values()))
+
+    def add(self, name: str, rows: list[dict[str, Any]]) -> None:
+        """Count the predictions of all methods for one cloud, or its error."""
+        self._clouds += 1
+        error = next((row["error"] for row in rows if "error" in row), None)
+        if error is not None:
+            alike = re.sub(r"\d+", "0", error)  # the same problem with other numbers
+            self._errors.setdefault(alike, []).append((name, error))
+            return
+        for row in rows:
+            self._states.setdefault(row["method"], Counter())[row["state"]] += 1
+            self._milliseconds.setdefault(row["method"], []).append(row["milliseconds"])
+
+    def print_errors(self) -> None:
+        """Print one line for each kind of error on standard error."""
+        for cases in self._errors.values():
+            name, error = cases[0]
+            line = (
+                f"{name}: {error}"
+                if len(cases) == 1
+                else f"{self._count(len(cases))}: {error}; first: {name}"
+            )
+            stderr.print(line, style="red")
+
+    def print_failures(self) -> None:
+        """Print the number of failures on standard error, if there are any."""
+        if self.failures:
+            stderr.print(f"no prediction for {self.failures} of {self._count(self._clouds)}")
+
+    def print_counts(self, end: str = "") -> None:
+        """Print a line for each method on standard output.
+
+        Args:
+            end: what to say after the counts.
+        """
+        failed = f"; no prediction for {self.failures}" if self.failures else ""
+        for method, states in self._states.items():
+            counts = [f"{states[state]} {state}" for state in STATES if states[state]]
+            counts += [f"{states[None]} none"] if states[None] else []
+            label = f"{method}: " if len(self._states) > 1 else ""
+            stdout.print(
+                f"{label}{self._count(self._clouds)}: {', '.join(counts)}{failed}; "
+                f"{median(self._milliseconds[method]):.0f} ms each{end}"
+            )
+
+    def _count(self, number: int) -> str:
+        return f"{number} {self._noun}{'' if number == 1 else 's'}"

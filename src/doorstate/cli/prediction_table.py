@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Table of `doorstate predict`: a row as soon as it is known, and its reason below it."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+from rich.text import Text
+
+from doorstate.cli import console
+from doorstate.cli.console import printable
+
+_STATE_STYLES = {"closed": "red", "semi_open": "yellow", "open": "green"}
+_MISSING = "-"
+_GAP = "  "
+_NARROWEST_NAME = 12
+
+
+class _Column(NamedTuple):
+    title: str
+    width: int
+    cell: Callable[[dict[str, Any]], str]
+
+
+def _number(name: str, pattern: str) -> Callable[[dict[str, Any]], str]:
+    """Return a function of a row that formats a value; answers without a state have none."""
+
+    def cell(row: dict[str, Any]) -> str:
+        value = row.get(name)
+        return _MISSING if value is None or row["state"] is None else pattern.format(value)
+
+    return cell
+
+
+def _probability(row: dict[str, Any]) -> str:
+    probabilities = row.get("probabilities")
+    return f"{probabilities[row['state']]:.2f}" if probabilities and row["state"] else _MISSING
+
+
+def _distance(row: dict[str, Any]) -> str:
+    if row["state"] is None or row.get("door_x_m") is None:
+        return _MISSING
+    return f"{math.hypot(row['door_x_m'], row['door_y_m']):.2f} m"
+
+
+_COLUMNS = (
+    _Column("prob.", 5, _probability),
+    _Column("angle", 5, _number("opening_angle_deg", "{:.0f}°")),
+    _Column("passable", 8, _number("passable_width_m", "{:.2f} m")),
+    _Column("distance", 8, _distance),
+    _Column("ms", 5, lambda row: f"{row['milliseconds']:.0f}"),
+)
+_STATE_WIDTH = 9
+_CELLS_WIDTH = len(_GAP) + _STATE_WIDTH + sum(len(_GAP) + column.width for column in _COLUMNS)
+
+
+class PredictionTable:
+    """Prints predictions on standard output.
+
+    Args:
+        title: of the first column, such as "file".
+        names: names of the first column, as far as they are known; they fit into it where the output is no terminal.
+        methods: names of the methods; several are listed below the name of each cloud.
+    """
+
+    def __init__(self, title: str, names: Sequence[str], methods: Sequence[str]) -> None:
+        self._by_method = len(methods) > 1
+        self._title = title
+        self._width = console.stdout.width if console.stdout.is_terminal else None
+        labels = (
+            [*(f"  {method}" for method in methods)] if self._by_method else [printable(n) for n in names]
+        )
+        longest = max(map(len, [title, *labels]), default=0)
+        room = longest if self._width is None else max(_NARROWEST_NAME, self._width - _CELLS_WIDTH)
+        self._name_width = min(longest, room)
+        self._last_name: str | None = None
+
+    def add(self, name: str, row: dict[str, Any]) -> None:
+        """Print a prediction.
+
+        Args:
+            name: file, or time stamp of a message.
+            row: prediction by `prediction_to_dict`, with its `method`.
+        """
+        if self._last_name is None:
+            self._print_titles()
+        if self._by_method and name != self._last_name:
+            console.stdout.print(name, style="bold")
+        self._last_name = name
+        line = Text(_fit(f"  {row['method']}" if self._by_method else printable(name), self._name_width))
+        state = row["state"]
+        line.append(f"{_GAP}{state or 'none':<{_STATE_WIDTH}}", _STATE_STYLES.get(state, "bold"))
+        for column in _COLUMNS:
+            line.append(f"{_GAP}{column.cell(row):>{column.width}}")
+        console.stdout.print(line)
+        if reason := row.get("reason"):
+            self._print_reason(printable(reason))
+
+    def _print_titles(self) -> None:
+        titles = [f"{self._title:<{self._name_width}}", f"{'state':<{_STATE_WIDTH}}"]
+        titles += [f"{column.title:>{column.width}}" for column in _COLUMNS]
+        console.stdout.print(_GAP.join(titles), style="bold underline")
+
+    def _print_reason(self, reason: str) -> None:
+        indent = "    " if self._by_method else "  "
+        lines = [indent + reason]
+        if self._width is not None:
+            lines = textwrap.wrap(
+                reason, self._width, initial_indent=indent, subsequent_indent=indent, break_long_words=False
+            )
+        for line in lines:
+            console.stdout.print(line, style="dim")
+
+
+def _fit(name: str, width: int) -> str:
+    """Return a name of this width; the end of a long one tells more than its beginning."""
+    return f"{name:<{width}}" if len(name) <= width else f"…{name[1 - width :]}"
