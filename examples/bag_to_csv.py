@@ -28,7 +28,7 @@ def main(recording: Path, table: Path) -> None:
         rows.writerow(["stamp_s", "state", "probability"])
         topic = bag.choose()  # by name, if there are several
         # The frame is that of PointCloud2 topics; depth images are always optical.
-        for stamp_s, _, cloud in bag.clouds(topic, ReadOptions(frame="optical")):
+        for stamp_s, _, cloud in bag.clouds(topic, ReadOptions(axes="optical")):
             if isinstance(cloud, DoorstateError):  # a damaged message
                 print(f"{stamp_s:.3f}: {cloud}", file=sys.stderr)
                 continue

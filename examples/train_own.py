@@ -5,7 +5,7 @@
 
 The folder has one sub-folder for each state (open, semi-open, closed, in any usual spelling), with thirty clouds at
 least and better a thousand. If it is stopped, the same command continues. Clouds of most cameras need
-`--frame optical`; for depth images, pass the camera to `ReadOptions`.
+`--axes optical`; for depth images, pass the camera to `ReadOptions`.
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ def main() -> None:
     )
     parser.add_argument("clouds", type=Path)
     parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--frame", default="body", choices=("body", "optical"))
+    parser.add_argument("--axes", default="ros", choices=("ros", "optical", "opengl"))
     parser.add_argument("--units", default="m", choices=tuple(UNITS_M))
     parser.add_argument("--network", default="pointnet2")
     parser.add_argument("--points", type=int, default=1024)
     parser.add_argument("--epochs", type=int, default=12)
     arguments = parser.parse_args()
-    options = ReadOptions(frame=arguments.frame, units_m=UNITS_M[arguments.units])
+    options = ReadOptions(axes=arguments.axes, units_m=UNITS_M[arguments.units])
 
     with progress_bar("Preparing") as progress:
         prepared = prepare_dataset(

@@ -77,7 +77,7 @@ def test_unknown_options_and_commands_are_exit_code_2(run: Run) -> None:
         (["export", "--out", "x.pb"], 2, "--out x.pb"),
         (["simulate", "--out", "x", "--poses", "0"], 2, "--poses"),
         (["predict", ".", "--units", "furlongs"], 2, "furlongs"),
-        (["predict", ".", "--frame", "sideways"], 2, "sideways"),
+        (["predict", ".", "--axes", "sideways"], 2, "sideways"),
         (["predict", ".", "--network", "pointnett"], 2, "pointnett"),
         (["predict", ".", "--weights", "gone.safetensors"], 1, "gone.safetensors"),
         (["simulate", "--out", "x", "--preset", "mars"], 2, "mars"),

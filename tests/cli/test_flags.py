@@ -11,10 +11,11 @@ def test_names_become_flags() -> None:
     assert format_flag("max_depth_m") == "--max-depth-m"
     assert format_flag("num_points", 128) == "--points 128"
     assert format_flag("roll_deg", 90) == "--roll 90"
+    assert format_flag("ignore_viewpoint", True) == "--ignore-viewpoint"
 
 
 def test_errors_name_flags() -> None:
-    error = ConfigError("too few", field="num_points", suggestions={"frame": "optical", "depth_scale_m": 0.1})
+    error = ConfigError("too few", field="num_points", suggestions={"axes": "optical", "depth_scale_m": 0.1})
     line = error.describe(format_flag)
     assert "--points" in line
-    assert "--frame optical --depth-scale 0.1" in line
+    assert "--axes optical --depth-scale 0.1" in line

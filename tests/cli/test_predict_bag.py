@@ -160,16 +160,19 @@ def test_camera_of_depth_images_from_topic_or_flags(predict: Run, weights: Path,
     assert json.loads(from_topic)["probabilities"] == json.loads(from_flags)["probabilities"]
 
 
-def test_optical_frame_read_as_body_warns_once(predict: Run, weights: Path, tmp_path: Path) -> None:
+def test_axes_are_those_that_the_header_names(predict: Run, weights: Path, tmp_path: Path) -> None:
     messages = recording()
     for message in messages:
         message.frame_id = "camera_depth_optical_frame"
     path = write_bag(tmp_path, "mcap", messages)
-    code, _, err = predict("--bag", path, "--weights", weights)
-    assert code == 0
-    assert err.count("\n") == 1
-    assert "--frame optical" in err
-    assert predict("--bag", path, "--weights", weights, "--frame", "optical")[2] == ""
+    code, named, err = predict("--bag", path, "--weights", weights, "--json")
+    assert (code, err) == (0, "")
+    poses = [json.loads(line)["sensor_pose"] for line in named.splitlines()]
+    assert {(pose["axes"], pose["axes_from"]) for pose in poses} == {("rdf", "frame_id")}
+    given = predict("--bag", path, "--weights", weights, "--json", "--axes", "optical")[1]
+    assert [json.loads(line)["probabilities"] for line in given.splitlines()] == [
+        json.loads(line)["probabilities"] for line in named.splitlines()
+    ]
 
 
 @pytest.mark.parametrize(

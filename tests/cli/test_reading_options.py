@@ -28,11 +28,11 @@ def test_command_gets_one_value() -> None:
 
     app = typer.Typer()
     app.command()(command)
-    arguments = ["a", "--every", "3", "--frame", "optical", "--units", "mm"]
+    arguments = ["a", "--every", "3", "--axes", "optical", "--units", "mm"]
     arguments += ["--fx", "500", "--fy", "501", "--cx", "320", "--cy", "240"]
     assert CliRunner().invoke(app, arguments).exit_code == 0
     camera = Pinhole(500.0, 501.0, 320.0, 240.0)
-    assert calls == [("a", 3, ReadOptions("optical", intrinsics=camera, units_m=0.001))]
+    assert calls == [("a", 3, ReadOptions(axes="optical", intrinsics=camera, units_m=0.001))]
 
 
 @pytest.mark.parametrize("command", [evaluate, predict, prepare, view])
@@ -47,6 +47,6 @@ def test_a_layout_excludes_all_but_the_camera() -> None:
     camera = Pinhole(500.0, 501.0, 320.0, 240.0)
     check_layout("deepdoors2", ReadOptions(intrinsics=camera))
     check_layout(None, ReadOptions(roll_deg=90))
-    for options in (ReadOptions("optical"), ReadOptions(roll_deg=90), ReadOptions(units_m=0.001)):
+    for options in (ReadOptions(axes="optical"), ReadOptions(roll_deg=90), ReadOptions(units_m=0.001)):
         with pytest.raises(ConfigError):
             check_layout("deepdoors2", options)

@@ -73,7 +73,7 @@ def test_the_index_overrides_the_read_options_of_its_files(tmp_path: Path) -> No
     write(tmp_path, "optical.xyz")
     index(
         tmp_path,
-        "file,state,door,fx,fy,cx,cy,width,height,depth_unit_m,frame,roll_deg\n"
+        "file,state,door,fx,fy,cx,cy,width,height,depth_unit_m,axes,roll_deg\n"
         "own.png,Half open,kitchen,8,8,2.5,1.5,6,4,0.0025,,\n"
         "all.png,none,,?,?,?,?,6,4,,,180\n"
         "optical.xyz,openings,hall,,,,,,,,optical,\n",
@@ -111,6 +111,7 @@ def test_an_image_of_another_size_than_in_the_index_is_refused(tmp_path: Path) -
         ("file,state,fx\na.xyz,open,8\n", DatasetError, "fy"),
         ("file,state,fx\na.xyz,open,wide\n", DatasetError, "fx"),
         ("file,state,roll_deg\na.xyz,open,nan\n", DatasetError, "roll_deg"),
+        ("file,state,frame\na.xyz,open,optical\n", DatasetError, "frame"),
     ],
 )
 def test_an_invalid_index_is_refused_with_its_column(
@@ -123,7 +124,7 @@ def test_an_invalid_index_is_refused_with_its_column(
 
 
 @pytest.mark.parametrize(
-    "text", ["file,state,depth_unit_m\na.xyz,open,0\n", "file,state,frame\na.xyz,open,map\n"]
+    "text", ["file,state,depth_unit_m\na.xyz,open,0\n", "file,state,axes\na.xyz,open,map\n"]
 )
 def test_an_index_with_impossible_options_is_refused(text: str, tmp_path: Path) -> None:
     with pytest.raises(CameraError):

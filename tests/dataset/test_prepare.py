@@ -308,7 +308,7 @@ def test_class_folders_are_prepared_and_rejected_files_listed_with_reasons(
 def test_poses_add_strata_and_read_options_apply(class_folders: Path, tmp_path: Path) -> None:
     poses = tmp_path / "poses.csv"
     poses.write_text("file,x_m,y_m,room\nOpen/a.pcd,0.0,2.2,hall\n", encoding="utf-8")
-    options = ReadOptions(frame="optical")
+    options = ReadOptions(axes="optical")
     dataset = prepare_dataset(Preparation(class_folders, SPEC, poses, options), tmp_path / "doors", 1).dataset
     index = dataset.index_of("Open/a")
     row = dataset.rows[index]

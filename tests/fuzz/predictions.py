@@ -38,7 +38,7 @@ _MAX_BYTES = 2**16
 _NUMBERS = (0.0, np.nan, np.inf, -np.inf, -1.0, 1e-45, 1e-30, 1e-6, 2.0, 1e3, 1e6, 1e30, 3.4e38)
 _DTYPES = ("<f4", "<f4", "<f4", ">f4", "<f2", "<f8", "<i4", "u1")
 _QUERIES = (
-    b"format=npy&frame=optical&roll=90",
+    b"format=npy&axes=optical&roll=90",
     b"filename=a.png&fx=14&fy=14&cx=7.5&cy=5.5&depth_scale=0.001",
     b"format=csv&units=mm",
 )

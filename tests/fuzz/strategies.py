@@ -34,10 +34,13 @@ _NUMBERS = (b"-1", b"0", b"1", b"2147483648", b"9223372036854775808", b"1" + b"0
 _SIZES = (-1, 0, 1, 2, 3, 11, 12, 16, 80, 960, 65535, 2**31 - 1, 2**31, 2**32 - 1)
 _HEADER_BYTES = 300
 
+HEADER = SimpleNamespace(frame_id="camera_link")
 OPTIONS = st.builds(
     ReadOptions,
-    frame=st.sampled_from(["body", "optical"]),
-    roll_deg=st.sampled_from([0, 90, 180, 270]),
+    axes=st.sampled_from(["auto", "ros", "optical", "opengl"]),
+    roll_deg=st.sampled_from([0, 90, 180, 33.3]),
+    pitch_deg=st.sampled_from([0, -20.5, 90]),
+    ignore_viewpoint=st.booleans(),
     intrinsics=st.sampled_from(
         [CAMERA, None, Intrinsics(WIDTH, HEIGHT, *CAMERA), Intrinsics(2, 1, 1, 1, 0, 0)]
     ),
@@ -114,7 +117,7 @@ def cloud_messages(draw: st.DrawFn) -> SimpleNamespace:
         for place, name in enumerate(names)
     ]
     sizes = {"height": height, "width": width, "point_step": 12, "row_step": 12 * width}
-    return draw(_messages(sizes, points.astype("<f4").tobytes(), {"fields": fields}))
+    return draw(_messages(sizes, points.astype("<f4").tobytes(), {"fields": fields, "header": HEADER}))
 
 
 @st.composite

@@ -22,7 +22,7 @@ from doorstate.errors import DoorstateError
 from doorstate.io.bags import open_bag
 from doorstate.io.body_frame import points_from_depth
 from doorstate.io.camera import Pinhole, read_intrinsics
-from doorstate.io.messages import points_from_message
+from doorstate.io.messages import cloud_from_message
 from doorstate.io.options import ReadOptions
 from doorstate.io.readers import BAG_SUFFIXES, CLOUD_SUFFIXES, parse_cloud, read_cloud
 from doorstate.types import Points
@@ -81,13 +81,13 @@ def _read_camera(data: bytes, suffix: str) -> None:
     def read() -> Points:
         camera = read_intrinsics(path)
         pinhole = Pinhole(camera.fx, camera.fy, camera.cx, camera.cy)
-        return points_from_depth(examples.SCENE[..., 0], ReadOptions(intrinsics=pinhole))
+        return points_from_depth(examples.SCENE[..., 0], ReadOptions(intrinsics=pinhole)).points
 
     check(read)
 
 
 def _read_message(message: SimpleNamespace, options: ReadOptions, message_type: str) -> None:
-    check(lambda: points_from_message(message, f"sensor_msgs/msg/{message_type}", options))
+    check(lambda: cloud_from_message(message, f"sensor_msgs/msg/{message_type}", options).points)
 
 
 def _read_bag(path: Path, options: ReadOptions, topic_number: int) -> None:

@@ -106,8 +106,8 @@ def test_a_cloud_in_the_optical_frame_suggests_the_frame() -> None:
     abstention = Gate()(room()[..., (1, 2, 0)] * np.float32((-1, -1, 1)))
     assert abstention is not None
     assert abstention.code == "points_behind_camera"
-    assert abstention.suggestions == {"frame": "optical"}
-    assert "--frame optical" in abstention.describe(lambda name, value: f"--{name} {value}")
+    assert abstention.suggestions == {"axes": "optical"}
+    assert "--axes optical" in abstention.describe(lambda name, value: f"--{name} {value}")
 
 
 def test_half_an_image_is_rejected() -> None:

@@ -25,8 +25,8 @@ from doorstate.inference.waiting import wait_for
 from doorstate.inference.watch import DoorWatch
 from doorstate.inference.watch_settings import WatchSettings, parse_settings
 from doorstate.io.body_frame import points_in_body
-from doorstate.io.depth import undo_roll
 from doorstate.io.options import ReadOptions
+from doorstate.io.sensor_pose import camera_pose
 from doorstate.types import STATES, DoorState, Points
 
 POINTS = 512
@@ -153,18 +153,18 @@ def test_silence_is_unknown_and_resets(predictor: Predictor, clouds: list[Points
 
 
 @pytest.mark.parametrize("roll_deg", [0, 90, 180, 270])
-@pytest.mark.parametrize(("frame", "frame_id", "optical"), [
+@pytest.mark.parametrize(("axes", "frame_id", "optical"), [
     ("auto", OPTICAL, True),
     ("auto", "camera_link", False),
     ("optical", "camera_link", True),
-    ("body", OPTICAL, False),
+    ("ros", OPTICAL, False),
 ])  # fmt: skip
 def test_frames_and_rolled_cameras_do_not_change_the_state_and_places_are_in_them(
-    frame: str, frame_id: str, optical: bool, roll_deg: int, clouds: list[Points]
+    axes: str, frame_id: str, optical: bool, roll_deg: int, clouds: list[Points]
 ) -> None:
-    settings = parse_settings({"frame": frame, "roll": roll_deg, "rule": "wall_leaf_angle"})
+    settings = parse_settings({"axes": axes, "roll": float(roll_deg), "rule": "wall_leaf_angle"})
     upright = DoorWatch(parse_settings({"rule": "wall_leaf_angle"})).process(cloud_message(clouds[1]), 0)
-    rolled = undo_roll(clouds[1], (360 - roll_deg) % 360)
+    rolled = camera_pose("ros", -roll_deg).to_body(clouds[1])
     sent = to_optical(rolled) if optical else rolled
     report = DoorWatch(settings).process(cloud_message(sent, frame_id=frame_id), 0)
     assert report.prediction.state is upright.prediction.state is DoorState.SEMI_OPEN
@@ -174,9 +174,11 @@ def test_frames_and_rolled_cameras_do_not_change_the_state_and_places_are_in_the
         == [shape.name for shape in upright.prediction.detections]
         != []
     )
-    options = ReadOptions("optical" if optical else "body", roll_deg)
+    options = ReadOptions(axes="optical" if optical else "ros", roll_deg=roll_deg)
     for detection, expected in zip(report.detections, upright.prediction.detections, strict=True):
-        np.testing.assert_allclose(points_in_body(detection.points_m, options), expected.points_m, atol=1e-3)
+        np.testing.assert_allclose(
+            points_in_body(detection.points_m, options).points, expected.points_m, atol=1e-3
+        )
 
 
 def test_depth_images_need_a_camera_and_give_the_prediction_of_clouds(
@@ -257,8 +259,8 @@ def test_parameters_choose_the_predictor(weights: object) -> None:
     ({"points": "many"}, "points"),
     ({"points": True}, "points"),
     ({"budget_ms": float("inf")}, "budget_ms"),
-    ({"frame": "map"}, "frame"),
-    ({"roll": 45}, "roll"),
+    ({"axes": "map"}, "axes"),
+    ({"roll": "left"}, "roll"),
     ({"silence_s": 0.0}, "silence_s"),
 ])  # fmt: skip
 def test_a_wrong_parameter_is_one_line(parameters: dict[str, Any], field: str | None) -> None:

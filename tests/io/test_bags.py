@@ -133,9 +133,9 @@ def test_every_third_message(tmp_path: Path) -> None:
 def test_frame_roll_and_units_are_those_of_files(tmp_path: Path) -> None:
     right, down, forward = 100.0, 200.0, 3000.0  # millimetres, of a camera turned clockwise
     path = write_bag(tmp_path, "mcap", [cloud("/points", np.array([[right, down, forward]]))])
-    upright = read_one(path, ReadOptions(frame="optical", units_m=0.001))
+    upright = read_one(path, ReadOptions(axes="optical", units_m=0.001))
     np.testing.assert_allclose(upright, [[3, -0.1, -0.2]], rtol=1e-6)
-    turned = read_one(path, ReadOptions(frame="optical", units_m=0.001, roll_deg=90))
+    turned = read_one(path, ReadOptions(axes="optical", units_m=0.001, roll_deg=90))
     np.testing.assert_allclose(turned, [[3, 0.2, -0.1]], rtol=1e-6)
 
 

@@ -25,8 +25,10 @@ def test_depth_without_a_camera() -> None:
 
 def test_a_pinhole_fits_every_image_size() -> None:
     pinhole = Pinhole(CAMERA.fx, CAMERA.fy, CAMERA.cx, CAMERA.cy)
-    expected = points_from_depth(DEPTH_MM, ReadOptions(intrinsics=CAMERA))
-    np.testing.assert_array_equal(points_from_depth(DEPTH_MM, ReadOptions(intrinsics=pinhole)), expected)
+    expected = points_from_depth(DEPTH_MM, ReadOptions(intrinsics=CAMERA)).points
+    np.testing.assert_array_equal(
+        points_from_depth(DEPTH_MM, ReadOptions(intrinsics=pinhole)).points, expected
+    )
 
 
 @pytest.mark.parametrize(
@@ -47,12 +49,12 @@ def test_the_unit_of_clouds_is_refused_for_integer_depth() -> None:
     with pytest.raises(CameraError) as caught:
         points_from_depth(DEPTH_MM, centimetres)
     assert caught.value.suggestions == {"depth_scale_m": 0.01}
-    assert points_from_depth(DEPTH_MM, replace(centimetres, depth_scale_m=0.01)).shape == (4, 20, 3)
+    assert points_from_depth(DEPTH_MM, replace(centimetres, depth_scale_m=0.01)).points.shape == (4, 20, 3)
 
 
 def test_signalling_nan_and_overflow_are_not_measured_and_do_not_warn() -> None:
     signalling = np.full((4, 20), 0x7FA00000, np.uint32).view(np.float32)
     for stored in (signalling, np.full((4, 20), 3e38, np.float32)):
-        depth = points_from_depth(stored, ReadOptions(intrinsics=CAMERA, units_m=1000.0))
+        depth = points_from_depth(stored, ReadOptions(intrinsics=CAMERA, units_m=1000.0)).points
         assert not np.isfinite(depth).any()
-        assert not np.isfinite(points_in_body(stored[:, :3], ReadOptions(units_m=1000.0))).any()
+        assert not np.isfinite(points_in_body(stored[:, :3], ReadOptions(units_m=1000.0)).points).any()

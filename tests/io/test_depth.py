@@ -9,11 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from doorstate.errors import CameraError
 from doorstate.io.camera import Intrinsics
-from doorstate.io.depth import depth_to_points, points_from_optical, undo_roll
+from doorstate.io.depth import depth_to_points
+from doorstate.io.sensor_pose import camera_pose
 
 SMALL = Intrinsics(width=4, height=3, fx=2.0, fy=4.0, cx=1.5, cy=1.0)
 ROLLS = (0, 90, 180, 270)
@@ -68,7 +68,9 @@ def test_equals_the_inverse_camera_matrix_in_the_optical_frame(
     matrix = np.array([[k.fx, 0, k.cx], [0, k.fy, k.cy], [0, 0, 1]])
     optical = np.linalg.solve(matrix, np.stack([u, v, np.ones(len(u))]) * depth_m[valid]).T
     points = depth_to_points(depth_m, k)
-    np.testing.assert_allclose(points[valid], points_from_optical(optical.astype(np.float32)), 1e-5, 1e-6)
+    np.testing.assert_allclose(
+        points[valid], camera_pose("optical").to_body(optical.astype(np.float32)), 1e-5, 1e-6
+    )
     assert np.isnan(points[~valid]).all()
 
 
@@ -92,7 +94,7 @@ def test_overflow_is_infinite_and_does_not_warn() -> None:
 
 def test_optical_axes_become_body_axes() -> None:
     right, down, forward = np.eye(3, dtype=np.float32)
-    body = points_from_optical(np.stack([right, down, forward]))
+    body = camera_pose("optical").to_body(np.stack([right, down, forward]))
     np.testing.assert_array_equal(body, [[0, -1, 0], [0, 0, -1], [1, 0, 0]])
 
 
@@ -124,16 +126,6 @@ def test_a_turned_camera_measures_the_same_points(
     np.testing.assert_allclose(points, np.rot90(depth_to_points(depth_m, k), roll_deg // 90), 1e-4, 1e-5)
 
 
-@given(npst.arrays(np.float32, (5, 3), elements=st.floats(-50, 50, width=32)), st.sampled_from(ROLLS))
-@settings(deadline=None, max_examples=50)
-def test_undo_roll_is_a_rotation_about_x(points: NDArray[np.float32], roll_deg: int) -> None:
-    rotation = Rotation.from_euler("x", roll_deg, degrees=True)
-    np.testing.assert_allclose(undo_roll(points, roll_deg), rotation.apply(points), atol=1e-5)
-    np.testing.assert_array_equal(undo_roll(undo_roll(points, roll_deg), (360 - roll_deg) % 360), points)
-
-
-def test_impossible_settings_are_camera_errors() -> None:
-    with pytest.raises(CameraError, match="45 degrees"):
-        depth_to_points(np.ones((3, 4)), SMALL, roll_deg=45)
+def test_another_image_size_is_a_camera_error() -> None:
     with pytest.raises(CameraError, match=r"3 x 4 .* 4 x 3"):
         depth_to_points(np.ones((4, 3)), SMALL)

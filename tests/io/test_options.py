@@ -16,8 +16,14 @@ from doorstate.io.options import ReadOptions, metres_per_unit
 @pytest.mark.parametrize(
     ("options", "field"),
     [
-        ({"roll_deg": 45}, "roll_deg"),
-        ({"frame": "sideways"}, "frame"),
+        ({"roll_deg": 361}, "roll_deg"),
+        ({"pitch_deg": 90.5}, "pitch_deg"),
+        ({"pitch_deg": np.nan}, "pitch_deg"),
+        ({"axes": "sideways"}, "axes"),
+        ({"axes": "flf"}, "axes"),
+        ({"axes": "rfd"}, "axes"),
+        ({"quaternion": (0.0, 0.0, 0.0, 0.5)}, "quaternion"),
+        ({"quaternion": (0.0, 0.0, 0.0, 1.0), "pitch_deg": 3.0}, "quaternion"),
         ({"units_m": 0.0}, "units_m"),
         ({"units_m": np.nan}, "units_m"),
         ({"depth_scale_m": np.nan}, "depth_scale_m"),

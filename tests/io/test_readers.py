@@ -83,10 +83,10 @@ def test_every_suffix_gives_the_same_points(
 def test_frame_units_and_roll_of_a_cloud(tmp_path: Path) -> None:
     # Optical millimetres: 2 m ahead, 1 m to the left, 0.5 m above the axis.
     path = _write(tmp_path, "a.xyz", "-1000 -500 2000\n")
-    options = ReadOptions(frame="optical", units_m=0.001)
+    options = ReadOptions(axes="optical", units_m=0.001)
     assert read_cloud(path, options).tolist() == [[2.0, 1.0, 0.5]]
     # The camera was turned clockwise by 90 degrees: its left is up, its up is right.
-    turned = ReadOptions(frame="optical", units_m=0.001, roll_deg=90)
+    turned = ReadOptions(axes="optical", units_m=0.001, roll_deg=90)
     assert read_cloud(path, turned).tolist() == [[2.0, -0.5, 1.0]]
     assert read_cloud(_write(tmp_path, "b.xyz", "2 1 0.5"), ReadOptions(roll_deg=180)).tolist() == [
         [2.0, -1.0, -0.5]
@@ -125,7 +125,7 @@ def test_depth_images_are_read_from_every_format(tmp_path: Path, name: str, roll
             np.savez(path, depth=DEPTH_MM, other=np.zeros(3))
     depth_m = DEPTH_MM / 1000
     depth_m[1, 2:4] = NAN  # both mean "not measured"
-    points = read_cloud(path, ReadOptions(intrinsics=CAMERA, roll_deg=roll_deg, frame="optical"))
+    points = read_cloud(path, ReadOptions(intrinsics=CAMERA, roll_deg=roll_deg, axes="optical"))
     np.testing.assert_array_equal(points, depth_to_points(depth_m, CAMERA, roll_deg))
     np.testing.assert_array_equal(np.flatnonzero(np.isnan(points[..., 0])), [22, 23])
 

@@ -29,7 +29,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from doorstate.inference.predictor import Predictor
 from doorstate.inference.watch_settings import WatchSettings
-from doorstate.io.depth import points_from_optical
+from doorstate.io.sensor_pose import camera_pose
 from doorstate.simulation.frames import replay
 from doorstate.simulation.presets import PRESETS, draw_rows
 from doorstate.types import Points
@@ -209,7 +209,9 @@ def test_a_closed_door_has_the_prediction_of_the_library(robot: Robot, clouds: l
     assert {stamp_of(report.header) for report in robot.reports("closed")} <= sent
     assert report.header.frame_id == FRAME_ID
     assert (report.status[0].level, report.status[0].message) == (DiagnosticStatus.OK, "closed")
-    expected = Predictor.load(NETWORK, num_points=POINTS)(points_from_optical(to_optical(clouds[0])))
+    expected = Predictor.load(NETWORK, num_points=POINTS)(
+        camera_pose("optical").to_body(to_optical(clouds[0]))
+    )
     probabilities = {name: float(values(report)[name]) for name in expected.probabilities}
     assert probabilities == pytest.approx(expected.probabilities, abs=1e-4)
 

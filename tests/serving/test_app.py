@@ -49,7 +49,7 @@ def test_abstention_has_a_reason_and_no_state() -> None:
         response = client.post("/predict?format=npy", content=NPY).raise_for_status().json()
     assert response["state"] is None
     assert "0.20 m" in response["reason"]
-    fields = {"state", "probabilities", "points", "milliseconds", "reason"}
+    fields = {"state", "probabilities", "points", "milliseconds", "reason", "sensor_pose"}
     assert set(response) == fields <= set(PredictionResponse.model_fields)
 
 
@@ -103,7 +103,7 @@ def test_frame_roll_units_and_camera_transform_the_cloud(client: httpx.Client) -
     forward, left, up = CLOUD.T
     optical_mm = (np.stack([-left, -up, forward], axis=1) * 1000).astype(np.float32)
     expected = probabilities(NPY, format="npy")
-    optical = probabilities(npy_bytes(optical_mm), format="npy", frame="optical", units="mm")
+    optical = probabilities(npy_bytes(optical_mm), format="npy", axes="optical", units="mm")
     assert optical == pytest.approx(expected, abs=1e-3)
     turned = probabilities(npy_bytes(np.stack([forward, up, -left], axis=1)), format="npy", roll=90)
     assert turned == pytest.approx(expected, abs=1e-5)
@@ -123,13 +123,13 @@ def test_frame_roll_units_and_camera_transform_the_cloud(client: httpx.Client) -
         ("format=pcd", b"nonsense", 400, ""),
         ("format=pcd", b"", 400, ""),
         ("format=npy", NPY[:50], 400, ""),
-        ("format=npy&frame=sideways", NPY, 400, "frame"),
-        ("format=npy&roll=45", NPY, 400, "roll"),
+        ("format=npy&axes=sideways", NPY, 400, "axes"),
+        ("format=npy&roll=450", NPY, 400, "roll"),
         ("format=npy&roll=left", NPY, 400, "roll"),
         ("format=npy&units=furlongs", NPY, 400, "units"),
         ("format=npy&depth_scale=nan", NPY, 400, "nan"),
         ("format=npy&fx=3", NPY, 400, "fy"),
-        ("format=npy&fram=optical", NPY, 400, "frame"),
+        ("format=npy&axis=optical", NPY, 400, "axes"),
         ("format=npy", npy_bytes(np.ones((30, 40), np.uint16)), 400, "fx"),
         ("format=stl", NPY, 415, "pcd"),
         ("filename=cloud", NPY, 415, "pcd"),
@@ -183,7 +183,7 @@ def test_openapi_describes_the_interface(client: httpx.Client) -> None:
     assert "application/octet-stream" in predict["requestBody"]["content"]
     assert set(predict["responses"]) == {"200", "400", "413", "415", "422", "503", "504"}
     schemas = description["components"]["schemas"]
-    assert set(schemas) == {"PredictionResponse", "HealthResponse", "ErrorResponse"}
+    assert set(schemas) == {"PredictionResponse", "SensorPoseResponse", "HealthResponse", "ErrorResponse"}
     for status, response in predict["responses"].items():
         name = response["content"]["application/json"]["schema"]["$ref"].rpartition("/")[2]
         assert name == ("PredictionResponse" if status == "200" else "ErrorResponse")

@@ -57,9 +57,9 @@ def evaluate(
 
     Clouds and depth images come with an index of their states, or in one sub-folder for each state. An index.csv has
     one row for each file, with the columns file and state. Optional columns are fx, fy, cx, cy, width, height
-    (pixels), depth_unit_m, frame, roll_deg, door, rgb (a colour image to show) and any others. A state other than the
-    three marks a frame without a clear door; such frames are reported separately. The exit code is 1 if a file could
-    not be read.
+    (pixels), depth_unit_m, axes, roll_deg, pitch_deg, door, rgb (a colour image to show) and any others. A state other
+    than the three marks a frame without a clear door; such frames are reported separately. The exit code is 1 if a file
+    could not be read.
 
     \b
     Examples:

@@ -6,6 +6,7 @@ from __future__ import annotations
 # Flags that are not spelled like the parameter of the library function they are passed to.
 _FLAGS = {
     "roll_deg": "--roll",
+    "pitch_deg": "--pitch",
     "depth_scale_m": "--depth-scale",
     "units_m": "--units",
     "num_points": "--points",
@@ -22,4 +23,4 @@ def format_flag(name: str, value: object = None) -> str:
 
         value = unit_name(value)
     flag = _FLAGS.get(name, f"--{name.replace('_', '-')}")
-    return flag if value is None else f"{flag} {value}"
+    return flag if value is None or value is True else f"{flag} {value}"

@@ -29,7 +29,7 @@ from doorstate.errors import CloudReadError, ConfigError, DoorstateError
 if TYPE_CHECKING:
     from doorstate.inference.predictor import Predictor
     from doorstate.io.options import ReadOptions
-    from doorstate.types import Points
+    from doorstate.io.sensor_pose import PosedCloud
 
 
 @with_reading_options
@@ -62,13 +62,13 @@ def predict(
     \b
     Examples:
       doorstate predict cloud.pcd
-      doorstate predict --frame optical --json recordings/
+      doorstate predict --axes optical --json recordings/
       doorstate predict recordings/ --out states.csv
       doorstate predict --network pointnet2 --rule plane_state --rule angle_bins cloud.pcd
       doorstate predict --network ogurob-dgcnn --budget-ms 33 recordings/
       doorstate predict depth.png --fx 385.9 --fy 385.4 --cx 317.8 --cy 243.7
       doorstate predict depth.png --intrinsics camera_info.yaml --roll 90
-      doorstate predict --bag run.bag --topic /camera/depth/points --frame optical --out run.csv
+      doorstate predict --bag run.bag --topic /camera/depth/points --out run.csv
     """
     from doorstate.cli.predict_bag import predict_bag
     from doorstate.cli.predictors import Methods, load_predictors
@@ -119,7 +119,7 @@ def _find(paths: list[Path]) -> list[Path | CloudReadError]:
 def _predict_file(
     predictors: Mapping[str, Predictor], source: Path | CloudReadError, options: ReadOptions
 ) -> Rows:
-    from doorstate.io.readers import read_cloud
+    from doorstate.io.readers import read_posed_cloud
 
     if isinstance(source, CloudReadError):
         return [
@@ -127,7 +127,7 @@ def _predict_file(
         ]
     row = {"file": _name(source)}
     try:
-        return [*_predict(predictors, read_cloud(source, options), row)]
+        return [*_predict(predictors, read_posed_cloud(source, options), row)]
     except DoorstateError as error:
         return [row | {"error": error.describe(format_flag, with_path=False)}]
     except MemoryError:
@@ -135,13 +135,14 @@ def _predict_file(
 
 
 def _predict(
-    predictors: Mapping[str, Predictor], cloud: Points, row: dict[str, Any]
+    predictors: Mapping[str, Predictor], cloud: PosedCloud, row: dict[str, Any]
 ) -> Iterator[dict[str, Any]]:
     from doorstate.inference.serialization import prediction_to_dict, require_points
 
     for method, predictor in predictors.items():
-        prediction = require_points(predictor(cloud))
-        yield row | {"method": method} | prediction_to_dict(prediction, format_flag)
+        prediction = require_points(predictor(cloud.points))
+        record = prediction_to_dict(prediction, format_flag)
+        yield row | {"method": method} | record | {"sensor_pose": cloud.pose.to_dict()}
 
 
 def _name(path: Path) -> str:

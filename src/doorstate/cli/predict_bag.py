@@ -13,7 +13,7 @@ from doorstate.errors import CloudReadError, DoorstateError
 
 if TYPE_CHECKING:
     from doorstate.inference.predictor import Predictor
-    from doorstate.io.bags import BagTopic, StampedCloud
+    from doorstate.io.bags import StampedCloud
     from doorstate.io.options import ReadOptions
 
 
@@ -43,22 +43,8 @@ def predict_bag(
         chosen = bag.choose(topic)
         predictors = load()
         messages = bag.clouds(chosen, options, camera_info_topic, every)
-        clouds = _predict_messages(predictors, warn_about_frame(messages, chosen, options))
+        clouds = _predict_messages(predictors, messages)
         output.write(clouds, list(predictors), [f"{0:.6f}".rjust(17)], -(-chosen.messages // every))
-
-
-def warn_about_frame(
-    messages: Iterable[StampedCloud], topic: BagTopic, options: ReadOptions
-) -> Iterator[StampedCloud]:
-    """Yield messages, and warn once if their frame is named like an optical one, but read as a body frame."""
-    from doorstate.cli.console import stderr
-    from doorstate.io.messages import CLOUD, is_optical
-
-    for number, message in enumerate(messages):
-        if number == 0 and topic.type == CLOUD and options.frame == "body" and is_optical(message.frame_id):
-            warning = f"{topic.name} is in frame {message.frame_id}: is --frame optical missing?"
-            stderr.print(warning)
-        yield message
 
 
 def _predict_messages(predictors: Mapping[str, Predictor], clouds: Iterable[StampedCloud]) -> Iterator[Rows]:
@@ -66,13 +52,14 @@ def _predict_messages(predictors: Mapping[str, Predictor], clouds: Iterable[Stam
     from doorstate.inference.serialization import prediction_to_dict
 
     try:
-        for stamp_s, _, cloud in clouds:
+        for stamp_s, _, cloud, pose in clouds:
             row: dict[str, Any] = {"stamp_s": round(stamp_s, 6)}
             try:
                 if isinstance(cloud, DoorstateError):
                     raise cloud
+                poses = {} if pose is None else {"sensor_pose": pose.to_dict()}
                 yield [
-                    row | {"method": method} | prediction_to_dict(predictor(cloud), format_flag)
+                    row | {"method": method} | prediction_to_dict(predictor(cloud), format_flag) | poses
                     for method, predictor in predictors.items()
                 ]
             except DoorstateError as error:

@@ -58,7 +58,7 @@ def prepare(
       doorstate prepare data/varied --thin --max-depth-m 5 --out data/varied-4096
       doorstate prepare data/varied --shard 2/8 --out data/varied-4096
       doorstate prepare DeepDoors2 --layout deepdoors2 --out data/deepdoors2
-      doorstate prepare ~/OGUROB_DOORS --poses poses.csv --frame optical --out data/original
+      doorstate prepare ~/OGUROB_DOORS --poses poses.csv --axes optical --out data/original
     """
     from doorstate._jobs import Shard
     from doorstate.cli.console import stdout

@@ -19,16 +19,28 @@ if TYPE_CHECKING:
 
 
 def read_options(
-    frame: Annotated[
+    axes: Annotated[
         str,
         typer.Option(
-            help="Axes of cloud files: body (x forward, y left, z up) or optical (z forward, y down)."
+            help="Directions of x, y and z in clouds: ros (flu), optical (rdf), opengl (rub), or three of the letters"
+            " f b l r u d. [default: optical if the frame of a message is named so, else ros]",
+            show_default=False,
         ),
-    ] = "body",
+    ] = "auto",
     roll: Annotated[
-        int,
-        typer.Option(help="Clockwise rotation of the camera, seen from behind: 0, 90, 180 or 270 degrees."),
-    ] = 0,
+        float, typer.Option(help="Clockwise rotation of the camera, seen from behind, in degrees.")
+    ] = 0.0,
+    pitch: Annotated[float, typer.Option(help="Angle by which the camera looks down, in degrees.")] = 0.0,
+    quaternion: Annotated[
+        str | None,
+        typer.Option(
+            help="In place of --roll and --pitch: 'x y z w' of the rotation from the frame of the points to a level"
+            " frame, as tf2_echo prints."
+        ),
+    ] = None,
+    ignore_viewpoint: Annotated[
+        bool, typer.Option("--ignore-viewpoint", help="Ignore VIEWPOINT of PCD files.")
+    ] = False,
     units: Annotated[str, typer.Option(help="Length unit of cloud files: m, dm, cm, mm or km.")] = "m",
     depth_scale: Annotated[float, typer.Option(help="Metres per unit of depth images.")] = 0.001,
     intrinsics: Annotated[
@@ -48,13 +60,23 @@ def read_options(
     """
     from doorstate.io.camera import pinhole_from_numbers, read_intrinsics
     from doorstate.io.options import ReadOptions, metres_per_unit
+    from doorstate.io.rotations import parse_quaternion
 
     camera = None if intrinsics is None else read_intrinsics(intrinsics)
     try:
         pinhole = pinhole_from_numbers(fx, fy, cx, cy)
         if camera is not None and pinhole is not None:
             raise ConfigError("give either --intrinsics or --fx --fy --cx --cy")
-        return ReadOptions(frame, roll, camera or pinhole, depth_scale, metres_per_unit(units))  # type: ignore[arg-type]
+        return ReadOptions(
+            axes=axes,
+            roll_deg=roll,
+            pitch_deg=pitch,
+            quaternion=None if quaternion is None else parse_quaternion(quaternion),
+            ignore_viewpoint=ignore_viewpoint,
+            intrinsics=camera or pinhole,
+            depth_scale_m=depth_scale,
+            units_m=metres_per_unit(units),
+        )
     except CameraError as error:  # typed values are usage errors, unlike those of a camera file
         raise ConfigError(error.message, field=error.field, expected=error.expected) from error
 
@@ -89,7 +111,7 @@ def with_reading_options(command: Callable[..., None]) -> Callable[..., None]:
 
 
 def check_layout(layout: str | None, options: ReadOptions) -> None:
-    """Check that frame, roll, units and depth scale are left to the layout of a published data set.
+    """Check that axes, tilt, units and depth scale are left to the layout of a published data set.
 
     Raises:
         ConfigError: one of them was given too.
@@ -97,4 +119,4 @@ def check_layout(layout: str | None, options: ReadOptions) -> None:
     from doorstate.io.options import DEFAULT_OPTIONS
 
     if layout is not None and replace(options, intrinsics=None) != DEFAULT_OPTIONS:
-        raise ConfigError("--frame, --roll, --units and --depth-scale cannot be combined with --layout")
+        raise ConfigError("--layout has its own axes, units and depth scale: give only the camera")

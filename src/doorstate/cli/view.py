@@ -82,8 +82,8 @@ def view(
       doorstate view cloud.pcd
       doorstate view --rule plane_state recordings/ --out recordings.html
       doorstate view data/ogurob-4096 --every 50
-      doorstate view --bag run.bag --topic /camera/depth/points --frame optical --every 15
-      doorstate view --live --bag run.bag --topic /camera/depth/points --frame optical
+      doorstate view --bag run.bag --topic /camera/depth/points --every 15
+      doorstate view --live --bag run.bag --topic /camera/depth/points
       doorstate view --live incoming/ --port 8080 --no-open
     """
     from doorstate._files import check_writable
@@ -139,14 +139,13 @@ def _open_bag(
     live: bool,
     rate_hz: float | None,
 ) -> Iterator[Clouds]:
-    from doorstate.cli.predict_bag import warn_about_frame
     from doorstate.io.bags import open_bag
     from doorstate.viewer.streams import limit_rate, name_messages, replay_stamps
 
     with open_bag(path) as bag:
         chosen = bag.choose(topic)
         messages = bag.clouds(chosen, options, camera_info_topic, every)
-        stamped = name_messages(warn_about_frame(messages, chosen, options))
+        stamped = name_messages(messages)
         clouds: Iterator[NamedCloud] = (cloud for _, cloud in stamped)
         if live:
             clouds = limit_rate(clouds, rate_hz) if rate_hz else replay_stamps(stamped)

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """`index.csv` of recorded frames: one line a file, with its label, and its camera where known.
 
-Columns `file` and `state` are required. `fx`, `fy`, `cx`, `cy`, `width`, `height` (pixels), `depth_unit_m`, `frame` and
-`roll_deg` override the read options of that file; an empty text or `?` is unknown. Further columns are kept.
+Columns `file` and `state` are required. `fx`, `fy`, `cx`, `cy`, `width`, `height` (pixels), `depth_unit_m`, `axes`,
+`roll_deg`, `pitch_deg` and `quaternion` override the read options of that file; an empty text or `?` is unknown.
+Further columns are kept.
 """
 
 from __future__ import annotations
@@ -11,14 +12,17 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from doorstate._files import read_csv
 from doorstate.dataset.class_folders import label_of_folder
 from doorstate.errors import DatasetError
 from doorstate.io.camera import Intrinsics, Pinhole
 from doorstate.io.options import ReadOptions
+from doorstate.io.rotations import parse_quaternion
 
 INDEX = "index.csv"
+_NUMBERS = {"depth_unit_m": "depth_scale_m", "roll_deg": "roll_deg", "pitch_deg": "pitch_deg"}
 _CAMERA = ("fx", "fy", "cx", "cy")
 _UNKNOWN = ("", "?")
 
@@ -73,14 +77,17 @@ def _options(row: Mapping[str, str], options: ReadOptions, index: Path, number: 
         else:
             # With a size, images of another size are refused.
             options = replace(options, intrinsics=Intrinsics(round(width), round(height), *intrinsics))
-    unit_m, roll_deg = value("depth_unit_m"), value("roll_deg")
-    if unit_m is not None:
-        options = replace(options, depth_scale_m=unit_m)
-    if roll_deg is not None:
-        options = replace(options, roll_deg=round(roll_deg))
-    if row.get("frame", "") not in _UNKNOWN:
-        options = replace(options, frame=row["frame"])  # type: ignore[arg-type]
-    return options
+    changes: dict[str, Any] = {}
+    for column, field in _NUMBERS.items():
+        if (number_of_column := value(column)) is not None:
+            changes[field] = number_of_column
+    if (axes := row.get("axes", "").strip()) not in _UNKNOWN:
+        changes["axes"] = axes
+    if row.get("frame", "").strip() in ("body", "optical"):
+        raise _invalid(index, number, "names axes in another column than `axes`", "frame")
+    if (quaternion := row.get("quaternion", "").strip()) not in _UNKNOWN:
+        changes |= {"quaternion": parse_quaternion(quaternion), "roll_deg": 0.0, "pitch_deg": 0.0}
+    return replace(options, **changes)
 
 
 def _number(row: Mapping[str, str], column: str, index: Path, number: int) -> float | None:

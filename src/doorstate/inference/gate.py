@@ -117,9 +117,11 @@ class Gate:
         share = float((view.sample[:, 0] < 0).mean())
         if share <= self.max_behind_share:
             return None
-        # In an optical frame z is forward and all points are ahead along it.
-        is_optical = float((view.sample[:, 2] > 0).mean()) > 1 - self.max_behind_share
-        suggestions = {"frame": "optical"} if is_optical else {}
+        # In an optical frame all points are ahead along z, in that of OpenGL against z.
+        above = float((view.sample[:, 2] > 0).mean())
+        names = {"optical": above, "opengl": 1 - above}
+        axes = next((name for name, ahead in names.items() if ahead > 1 - self.max_behind_share), None)
+        suggestions = {} if axes is None else {"axes": axes}
         return Abstention("points_behind_camera", {"share": share}, suggestions=suggestions)
 
     def _near_enough_and_not_covered(self, view: _View) -> Abstention | None:

@@ -8,7 +8,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from doorstate.clouds.measured import is_measured
 from doorstate.errors import CameraError, DoorstateError, summarize_exception
@@ -20,15 +19,9 @@ from doorstate.inference.state_filter import StateFilter
 from doorstate.inference.waiting import HoldTimer
 from doorstate.inference.watch_settings import MESSAGE_TYPES, WatchSettings
 from doorstate.io.camera import Intrinsics
-from doorstate.io.depth import undo_roll
-from doorstate.io.messages import (
-    CLOUD,
-    intrinsics_from_message,
-    is_optical,
-    points_from_message,
-    stamp_ns_of,
-)
-from doorstate.io.options import ReadOptions
+from doorstate.io.messages import CLOUD, cloud_from_message, intrinsics_from_message, stamp_ns_of
+from doorstate.io.options import DEFAULT_OPTIONS
+from doorstate.io.sensor_pose import PosedCloud, SensorPose
 from doorstate.rules.base import Detection
 from doorstate.types import DoorState, Points
 
@@ -91,8 +84,7 @@ class DoorWatch:
         stamp_ns = stamp_ns_of(message) or received_ns
         stamp_s = stamp_ns / 1e9
         self._frame_id = str(message.header.frame_id)
-        options = self._settings.read_options(is_optical(self._frame_id))
-        centre, prediction = self._predict(message, options)
+        centre, pose, prediction = self._predict(message)
         if prediction.state is not None:
             self._last_state_s = stamp_s
         elif stamp_s - self._last_state_s >= self._settings.silence_s:
@@ -100,7 +92,6 @@ class DoorWatch:
         filtered = self._filter.update(prediction, stamp_s)
         held_s = self._hold_timer.update(prediction, filtered, stamp_s)
         has_held = held_s is not None and held_s >= self._settings.hold_s
-        optical = self._type != CLOUD or options.frame == "optical"
         return DoorReport(
             stamp_ns,
             self._frame_id,
@@ -108,12 +99,9 @@ class DoorWatch:
             filtered,
             held_s,
             prediction.state is DoorState.OPEN and has_held,
-            _in_message_frame(centre, optical, options),
+            pose.from_body(centre),
             tuple(
-                Detection(
-                    detection.name,
-                    _in_message_frame(detection.points_m.astype(np.float32), optical, options),
-                )
+                Detection(detection.name, pose.from_body(detection.points_m))
                 for detection in prediction.detections
             ),
         )
@@ -129,26 +117,27 @@ class DoorWatch:
         self._filter, self._hold_timer = StateFilter(), HoldTimer()
         self._last_state_s = -math.inf
 
-    def _predict(self, message: Any, options: ReadOptions) -> tuple[Points, Prediction]:
-        """Return the centre (3,) of the measured points and the prediction, in the body frame."""
-        centre = np.zeros(3, np.float32)
+    def _predict(self, message: Any) -> tuple[Points, SensorPose, Prediction]:
+        """Return the centre (3,) of the measured points and the prediction, in the body frame, and the pose."""
+        centre, pose = np.zeros(3, np.float32), DEFAULT_OPTIONS.pose()
         try:
-            points = self._points(message, options)
+            points, pose = self._cloud(message)
             centre = _centre_m(points)
-            return centre, self._predictor(points)
+            return centre, pose, self._predictor(points)
         except DoorstateError as error:
             abstention = Abstention.from_error(error)
         except Exception as error:  # libraries raise anything for foreign bytes; a robot's node must go on
             sentence = f"damaged message ({summarize_exception(error)})"
             abstention = Abstention("damaged_message", message=sentence)
-        return centre, Prediction.abstain(abstention)
+        return centre, pose, Prediction.abstain(abstention)
 
-    def _points(self, message: Any, options: ReadOptions) -> Points:
+    def _cloud(self, message: Any) -> PosedCloud:
+        options = self._settings.read_options()
         if self._type != CLOUD:
             if isinstance(self._camera, CameraError):
                 raise self._camera
             options = replace(options, intrinsics=self._camera)
-        return points_from_message(message, self._type, options)
+        return cloud_from_message(message, self._type, options)
 
 
 def _centre_m(points: Points) -> Points:
@@ -157,12 +146,3 @@ def _centre_m(points: Points) -> Points:
     sample = flat[:: max(1, len(flat) // _CENTRE_POINTS)]
     sample = sample[is_measured(sample)]
     return np.median(sample, axis=0).astype(np.float32) if len(sample) else np.zeros(3, np.float32)
-
-
-def _in_message_frame(points: Points, optical: bool, options: ReadOptions) -> NDArray[np.float64]:
-    """Return points (..., 3) of the body frame in the frame of the message, in metres."""
-    rolled = undo_roll(points, -options.roll_deg % 360).astype(np.float64)
-    if not optical:
-        return rolled
-    forward, left, up = np.moveaxis(rolled, -1, 0)
-    return np.stack((-left, -up, forward), axis=-1)

@@ -14,6 +14,7 @@ from doorstate.inference.gate import DEFAULT_GATE
 from doorstate.inference.predictor import DEFAULT_NETWORK, Predictor
 from doorstate.io.messages import CLOUD, COMPRESSED_IMAGE, IMAGE
 from doorstate.io.options import ReadOptions
+from doorstate.io.rotations import parse_quaternion
 from doorstate.types import UNITS_M
 
 MESSAGE_TYPES = {"cloud": CLOUD, "depth": IMAGE, "compressed_depth": COMPRESSED_IMAGE}  # by input
@@ -35,11 +36,17 @@ class WatchSettings(FrozenModel):
         0.0, ge=0, description="In place of points: as many as this time allows; 0: no budget."
     )
     gate: bool = Field(True, description="Report clouds in which too much is missing as unknown.")
-    frame: Literal["auto", "body", "optical"] = Field(
-        "auto", description="Axes of clouds; auto: optical if the name of their frame contains it, else body."
+    axes: str = Field(
+        "auto",
+        description="Axes of clouds: ros, optical, opengl, or three letters such as flu; auto: optical if the name of"
+        " their frame contains it, else ros.",
     )
-    roll: Literal[0, 90, 180, 270] = Field(
-        0, description="Clockwise rotation of the camera, seen from behind, in degrees."
+    roll: float = Field(0.0, description="Clockwise rotation of the camera, seen from behind, in degrees.")
+    pitch: float = Field(0.0, description="Angle by which the camera looks down, in degrees.")
+    quaternion: str = Field(
+        "",
+        description="In place of roll and pitch: x, y, z, w of the rotation from the frame of the messages to a level"
+        " frame, as tf2_echo prints; empty: none.",
     )
     units: Literal["m", "mm"] = Field("m", description="Unit of clouds and of floating point depth.")
     depth_scale: float = Field(0.001, gt=0, description="Metres per unit of integer depth.")
@@ -50,11 +57,20 @@ class WatchSettings(FrozenModel):
     hold_s: float = Field(1.0, ge=0, description="Time for which open must have held before the way is free.")
     silence_s: float = Field(1.0, gt=0, description="Time without a state after which the door is unknown.")
 
-    def read_options(self, optical: bool) -> ReadOptions:
-        """Return the options for messages whose frame is optical by its name, or not."""
-        named: Literal["body", "optical"] = "optical" if optical else "body"
-        frame = named if self.frame == "auto" else self.frame
-        return ReadOptions(frame, self.roll, None, self.depth_scale, UNITS_M[self.units])
+    def read_options(self) -> ReadOptions:
+        """Return the options of messages, without a camera.
+
+        Raises:
+            CameraError: an impossible value.
+        """
+        return ReadOptions(
+            axes=self.axes,
+            roll_deg=self.roll,
+            pitch_deg=self.pitch,
+            quaternion=parse_quaternion(self.quaternion) if self.quaternion else None,
+            depth_scale_m=self.depth_scale,
+            units_m=UNITS_M[self.units],
+        )
 
     def load_predictor(self) -> Predictor:
         """Load and warm up the network or rule that is named.

@@ -29,12 +29,13 @@ from doorstate.io.messages import (
     CLOUD,
     COMPRESSED_IMAGE,
     IMAGE,
+    cloud_from_message,
     intrinsics_from_message,
-    points_from_message,
     stamp_ns_of,
 )
 from doorstate.io.options import DEFAULT_OPTIONS, ReadOptions
 from doorstate.io.readers import BAG_SUFFIXES
+from doorstate.io.sensor_pose import PosedCloud, SensorPose
 from doorstate.types import Points
 
 _COMPRESSED_DEPTH = "/compressedDepth"  # suffix of topic names by image_transport
@@ -55,6 +56,7 @@ class StampedCloud(NamedTuple):
     stamp_s: float  # of the header, or the time of recording if that is zero
     frame_id: str
     cloud: Points | DoorstateError  # (H, W, 3) or (N, 3) in the body frame, or the error of a damaged message
+    pose: SensorPose | None = None  # of the camera; None for a damaged message
 
 
 @contextmanager
@@ -148,7 +150,7 @@ class Bag:
 
         Args:
             topic: a topic returned by `choose`.
-            options: frame, units and camera.
+            options: axes, tilt, units and camera.
             camera_info_topic: topic with the camera of depth images; None takes the camera of the options, or the
                 topic `camera_info` beside the images.
             every: read one of this number of messages.
@@ -196,28 +198,29 @@ class Bag:
         return self._deserialize(unpack_zstd(raw) if raw[:4] == _ZSTD else raw, message_type)
 
     def _stamped(
-        self, log_ns: int, raw: bytes, message_type: str, convert: Callable[[Any], Points]
+        self, log_ns: int, raw: bytes, message_type: str, convert: Callable[[Any], PosedCloud]
     ) -> StampedCloud:
         stamp_ns, frame_id = log_ns, ""
         cloud: Points | DoorstateError
+        pose: SensorPose | None = None
         try:
             message = self._message(raw, message_type)
             stamp_ns = stamp_ns_of(message) or log_ns
             frame_id = message.header.frame_id
-            cloud = convert(message)
+            cloud, pose = convert(message)
         except DoorstateError as error:
             cloud = error
         except Exception as error:  # on damaged bytes rosbags and Pillow raise exceptions of any type
             cloud = CloudReadError(f"damaged message ({summarize_exception(error)})")
-        return StampedCloud(stamp_ns / 1e9, frame_id, cloud)
+        return StampedCloud(stamp_ns / 1e9, frame_id, cloud, pose)
 
     def _converter(
         self, topic: BagTopic, options: ReadOptions, camera_info_topic: str | None
-    ) -> Callable[[Any], Points]:
+    ) -> Callable[[Any], PosedCloud]:
         if topic.type != CLOUD and (camera_info_topic is not None or options.intrinsics is None):
             camera = self._camera(camera_info_topic or _camera_info_beside(topic.name))
             options = replace(options, intrinsics=camera)
-        return lambda message: points_from_message(message, topic.type, options)
+        return lambda message: cloud_from_message(message, topic.type, options)
 
     def _camera(self, name: str) -> Intrinsics:
         topic = self._topics.get(name)

@@ -10,29 +10,44 @@ from numpy.typing import NDArray
 
 from doorstate.errors import CameraError
 from doorstate.io.camera import Intrinsics, Pinhole
-from doorstate.io.depth import depth_to_points, points_from_optical, undo_roll
+from doorstate.io.depth import depth_to_points
 from doorstate.io.options import ReadOptions
-from doorstate.types import Points
+from doorstate.io.sensor_pose import PosedCloud, pose_in_map
+from doorstate.io.viewpoint import Viewpoint
 
 # Some recorders write the largest 16-bit value where nothing was measured; others write 0.
 _NOT_MEASURED = 65535
 
 
-def points_in_body(stored: NDArray[Any], options: ReadOptions) -> Points:
-    """Return stored points (..., 3) in metres and in the body frame."""
+def points_in_body(
+    stored: NDArray[Any], options: ReadOptions, *, frame_id: str = "", viewpoint: Viewpoint | None = None
+) -> PosedCloud:
+    """Return stored points (..., 3) in metres and in the body frame.
+
+    Args:
+        stored: points as stored.
+        options: axes, tilt and units.
+        frame_id: frame in the header of a message.
+        viewpoint: pose of the camera in the frame of the points, if they are not in the frame of the camera.
+
+    Raises:
+        CameraError: a pose that cannot be used.
+    """
+    pose = options.pose(frame_id)
+    if viewpoint is not None and not options.ignore_viewpoint:
+        x, y, z = (number * options.units_m for number in viewpoint.position)
+        pose = pose_in_map(pose, viewpoint._replace(position=(x, y, z)))
     with np.errstate(over="ignore", invalid="ignore"):  # overflow gives infinity, which is "not measured"
-        points = (stored.astype(np.float64) * options.units_m).astype(np.float32)
-    if options.frame == "optical":
-        points = points_from_optical(points)
-    return undo_roll(points, options.roll_deg)
+        return PosedCloud(pose.to_body(stored.astype(np.float64) * options.units_m), pose)
 
 
-def points_from_depth(stored: NDArray[Any], options: ReadOptions) -> Points:
+def points_from_depth(stored: NDArray[Any], options: ReadOptions) -> PosedCloud:
     """Return the points (H, W, 3) of a stored depth image (H, W), in metres and in the body frame.
 
     Raises:
         CameraError: no intrinsics, or those of another image size.
     """
+    pose = options.pose(is_depth=True)
     height, width = stored.shape
     intrinsics = options.intrinsics
     if intrinsics is None:
@@ -48,7 +63,8 @@ def points_from_depth(stored: NDArray[Any], options: ReadOptions) -> Points:
         depth_m = stored.astype(np.float64) * scale_m
     if stored.dtype.newbyteorder("=") == np.uint16:
         depth_m[stored == _NOT_MEASURED] = np.nan
-    return depth_to_points(depth_m, intrinsics, options.roll_deg)
+    points = depth_to_points(depth_m, intrinsics, pose.roll_deg, pose.pitch_deg)
+    return PosedCloud(points, pose)
 
 
 def _fit_to_image(camera: Pinhole, width: int, height: int) -> Intrinsics:

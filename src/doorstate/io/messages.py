@@ -11,7 +11,7 @@ from doorstate.io.camera import Intrinsics
 from doorstate.io.depth_messages import pixels_from_compressed_depth, pixels_from_image
 from doorstate.io.options import ReadOptions
 from doorstate.io.pointcloud2 import points_from_pointcloud2
-from doorstate.types import Points
+from doorstate.io.sensor_pose import PosedCloud
 
 # Message types by their ROS 2 names; rosbags uses the same names for ROS 1.
 CLOUD = "sensor_msgs/msg/PointCloud2"
@@ -20,16 +20,16 @@ COMPRESSED_IMAGE = "sensor_msgs/msg/CompressedImage"
 CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
 
 
-def points_from_message(message: Any, message_type: str, options: ReadOptions) -> Points:
+def cloud_from_message(message: Any, message_type: str, options: ReadOptions) -> PosedCloud:
     """Read a message of one of the three types as points in the body frame.
 
     Args:
         message: has the fields of its type.
         message_type: CLOUD, IMAGE or COMPRESSED_IMAGE.
-        options: frame, units and camera; images need a camera.
+        options: axes, tilt, units and camera; images need a camera.
 
     Returns:
-        (H, W, 3) or (N, 3) metres, x forward, y left, z up, NaN where nothing was measured.
+        (H, W, 3) or (N, 3) metres, x forward, y left, z up, NaN where nothing was measured, and the pose.
 
     Raises:
         CloudReadError: an image without depth, or fields that contradict each other.
@@ -55,12 +55,7 @@ def stamp_ns_of(message: Any) -> int:
     return int(stamp.sec) * 10**9 + int(stamp.nanosec)
 
 
-def is_optical(frame_id: str) -> bool:
-    """Return True if the name of a frame is that of an optical frame (REP 103): x right, y down, z forward."""
-    return "optical" in frame_id
-
-
-def _points_from_cloud(message: Any, options: ReadOptions) -> Points:
+def _points_from_cloud(message: Any, options: ReadOptions) -> PosedCloud:
     points = points_from_pointcloud2(
         message.height,
         message.width,
@@ -70,21 +65,21 @@ def _points_from_cloud(message: Any, options: ReadOptions) -> Points:
         message.row_step,
         message.data,
     )
-    return points_in_body(points, options)
+    return points_in_body(points, options, frame_id=str(message.header.frame_id))
 
 
-def _points_from_image(message: Any, options: ReadOptions) -> Points:
+def _points_from_image(message: Any, options: ReadOptions) -> PosedCloud:
     pixels = pixels_from_image(
         message.height, message.width, message.encoding, message.is_bigendian, message.step, message.data
     )
     return points_from_depth(pixels, options)
 
 
-def _points_from_compressed(message: Any, options: ReadOptions) -> Points:
+def _points_from_compressed(message: Any, options: ReadOptions) -> PosedCloud:
     return points_from_depth(pixels_from_compressed_depth(message.format, message.data), options)
 
 
-_READERS: dict[str, Callable[[Any, ReadOptions], Points]] = {
+_READERS: dict[str, Callable[[Any, ReadOptions], PosedCloud]] = {
     CLOUD: _points_from_cloud,
     IMAGE: _points_from_image,
     COMPRESSED_IMAGE: _points_from_compressed,

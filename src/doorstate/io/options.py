@@ -5,22 +5,30 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
 
 from doorstate.errors import CameraError, unknown_name
 from doorstate.io.camera import Intrinsics, Pinhole
-from doorstate.io.depth import check_roll
+from doorstate.io.rotations import Quaternion, parse_axes, quaternion_matrix
+from doorstate.io.sensor_pose import Origin, SensorPose, camera_pose, pose_from_quaternion
 from doorstate.types import UNITS_M
 
+AUTO = "auto"
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, kw_only=True)
 class ReadOptions:
-    """Frame, units and camera of a file or message.
+    """Axes, tilt, units and camera of a file or message.
 
     Args:
-        frame: frame of clouds, `body` (x forward, y left, z up) or `optical` (x right, y down, z forward); depth
+        axes: axes of clouds: `ros` (x forward, y left, z up), `optical` (x right, y down, z forward), `opengl` (x
+            right, y up, z back), or the directions of x, y and z as three letters among forward, back, left, right, up,
+            down, such as `flu`. `auto` is `optical` if the header of a message names such a frame, else `ros`. Depth
             images are always optical.
-        roll_deg: clockwise rotation of the camera, seen from behind: 0, 90, 180 or 270.
+        roll_deg: clockwise rotation of the camera, seen from behind: 90 for a camera on its right side.
+        pitch_deg: angle by which the camera looks down; negative if it looks up.
+        quaternion: x, y, z, w of the rotation from the frame of the points to a level frame (x forward, y left, z up),
+            in place of roll and pitch; its heading is left out.
+        ignore_viewpoint: read points of PCD files as points in the frame of the camera, whatever VIEWPOINT says.
         intrinsics: camera of depth images; a `Pinhole` fits every image size.
         depth_scale_m: metres per unit of integer depth images.
         units_m: metres per unit of clouds and of floating point depth images (metres by ROS REP 118).
@@ -29,22 +37,35 @@ class ReadOptions:
         CameraError: an impossible value.
     """
 
-    frame: Literal["body", "optical"] = "body"
-    roll_deg: int = 0
+    axes: str = AUTO
+    roll_deg: float = 0.0
+    pitch_deg: float = 0.0
+    quaternion: Quaternion | None = None
+    ignore_viewpoint: bool = False
     intrinsics: Intrinsics | Pinhole | None = None
     depth_scale_m: float = 0.001
     units_m: float = 1.0
 
     def __post_init__(self) -> None:
-        if self.frame not in ("body", "optical"):
-            raise CameraError(f"no frame {self.frame!r}", field="frame", expected="body or optical")
         for field in ("depth_scale_m", "units_m"):
             scale_m = getattr(self, field)
             if not (math.isfinite(scale_m) and scale_m > 0):
                 raise CameraError(
                     f"{scale_m} metres per unit is impossible", field=field, expected="a positive number"
                 )
-        check_roll(self.roll_deg)
+        for field, limit_deg in (("roll_deg", 360), ("pitch_deg", 90)):
+            if not abs(getattr(self, field)) <= limit_deg:  # also for NaN
+                raise CameraError(
+                    f"{getattr(self, field)} degrees is impossible",
+                    field=field,
+                    expected=f"{-limit_deg} to {limit_deg}",
+                )
+        if self.quaternion is not None and (self.roll_deg or self.pitch_deg):
+            raise CameraError("is given with a roll or pitch", field="quaternion", expected="one of them")
+        if self.quaternion is not None:
+            quaternion_matrix(self.quaternion)
+        if self.axes.lower() != AUTO:
+            parse_axes(self.axes)
         if isinstance(self.intrinsics, Pinhole):
             Intrinsics(1, 1, *self.intrinsics)  # checks the four numbers
         elif not isinstance(self.intrinsics, Intrinsics | None):
@@ -52,8 +73,33 @@ class ReadOptions:
                 f"{self.intrinsics!r} is not a camera", field="intrinsics", expected="Intrinsics or Pinhole"
             )
 
+    def pose(self, frame_id: str = "", *, is_depth: bool = False) -> SensorPose:
+        """Return the pose of the camera, for points in its own frame.
+
+        Args:
+            frame_id: frame in the header of a message.
+            is_depth: True for depth images.
+        """
+        axes, axes_from = self._axes(frame_id, is_depth)
+        if self.quaternion is not None:
+            return pose_from_quaternion(axes, self.quaternion, axes_from)
+        tilt_from: Origin = "given" if self.roll_deg or self.pitch_deg else "assumed"
+        return camera_pose(axes, self.roll_deg, self.pitch_deg, axes_from, tilt_from)
+
+    def _axes(self, frame_id: str, is_depth: bool) -> tuple[str, Origin]:
+        if is_depth:
+            return "rdf", "depth image"
+        if self.axes.lower() != AUTO:
+            return parse_axes(self.axes), "given"
+        return ("rdf", "frame_id") if is_optical(frame_id) else ("flu", "assumed")
+
 
 DEFAULT_OPTIONS = ReadOptions()
+
+
+def is_optical(frame_id: str) -> bool:
+    """Return True if the name of a frame is that of an optical frame (REP 103): x right, y down, z forward."""
+    return "optical" in frame_id
 
 
 def unit_name(units_m: float) -> str:

@@ -18,8 +18,10 @@ from doorstate.io.options import DEFAULT_OPTIONS, ReadOptions
 from doorstate.io.pcd import parse_pcd
 from doorstate.io.ply import parse_ply
 from doorstate.io.png import parse_depth_png
+from doorstate.io.sensor_pose import PosedCloud
 from doorstate.io.size_limits import check_point_count
 from doorstate.io.text import parse_table
+from doorstate.io.viewpoint import parse_viewpoint
 from doorstate.types import Points
 
 _PARSERS: dict[str, Callable[[bytes], NDArray[Any]]] = {
@@ -45,7 +47,7 @@ def read_cloud(path: str | Path, options: ReadOptions = DEFAULT_OPTIONS) -> Poin
 
     Args:
         path: a cloud (.pcd .ply .npy .npz .xyz .txt .csv) or a depth image (16-bit .png, 2-D .npy, .npz).
-        options: frame, units and camera.
+        options: axes, tilt, units and camera.
 
     Returns:
         (N, 3), or (H, W, 3) for images and organized clouds, float32 metres, in file order, NaN kept.
@@ -54,12 +56,17 @@ def read_cloud(path: str | Path, options: ReadOptions = DEFAULT_OPTIONS) -> Poin
         CloudReadError: the file does not have the format of its suffix.
         CameraError: a depth image without intrinsics, or with those of another image size.
     """
+    return read_posed_cloud(path, options).points
+
+
+def read_posed_cloud(path: str | Path, options: ReadOptions = DEFAULT_OPTIONS) -> PosedCloud:
+    """Read one file as `read_cloud` does, with the pose of its camera."""
     path = Path(path)
     try:
         if path.is_dir():
             raise CloudReadError("is a folder, not a file")
         check_suffix(path.suffix)
-        return parse_cloud(_read_bytes(path), path.suffix, options)
+        return parse_posed_cloud(_read_bytes(path), path.suffix, options)
     except DoorstateError as error:
         raise error.located(path) from error
 
@@ -70,7 +77,7 @@ def parse_cloud(data: bytes, suffix: str, options: ReadOptions = DEFAULT_OPTIONS
     Args:
         data: content of the file.
         suffix: format, such as `.pcd`.
-        options: frame, units and camera.
+        options: axes, tilt, units and camera.
 
     Returns:
         The points that `read_cloud` returns.
@@ -79,6 +86,11 @@ def parse_cloud(data: bytes, suffix: str, options: ReadOptions = DEFAULT_OPTIONS
         CloudReadError: the content does not have this format.
         CameraError: a depth image without intrinsics, or with those of another image size.
     """
+    return parse_posed_cloud(data, suffix, options).points
+
+
+def parse_posed_cloud(data: bytes, suffix: str, options: ReadOptions = DEFAULT_OPTIONS) -> PosedCloud:
+    """Read the content of a file as `parse_cloud` does, with the pose of its camera."""
     suffix = suffix.lower()
     check_suffix(suffix)
     if not data:
@@ -87,7 +99,10 @@ def parse_cloud(data: bytes, suffix: str, options: ReadOptions = DEFAULT_OPTIONS
         stored = _PARSERS[suffix](data)
         is_depth = suffix == ".png" or (stored.ndim == 2 and stored.shape[1] > _MAX_POINT_VALUES)
         check_point_count(math.prod(stored.shape if is_depth else stored.shape[:-1]))
-        return points_from_depth(stored, options) if is_depth else _points_from_rows(stored, options)
+        if is_depth:
+            return points_from_depth(stored, options)
+        viewpoint = parse_viewpoint(data) if suffix == ".pcd" and not options.ignore_viewpoint else None
+        return points_in_body(_rows(stored), options, viewpoint=viewpoint)
     except DoorstateError:
         raise
     except Exception as error:
@@ -116,9 +131,9 @@ def _read_bytes(path: Path) -> bytes:
         raise CloudReadError(f"cannot be read: {error.strerror or error}") from error
 
 
-def _points_from_rows(stored: NDArray[Any], options: ReadOptions) -> Points:
+def _rows(stored: NDArray[Any]) -> NDArray[Any]:
     if stored.ndim not in (2, 3) or not 3 <= stored.shape[-1] <= _MAX_POINT_VALUES:
         raise CloudReadError(f"holds shape {stored.shape}", expected="(N, 3), (H, W, 3) or depth (H, W)")
     if stored.size == 0:  # shape (10**9, 0, 3) is valid, but nothing to compute with
         return np.empty((0, 3), np.float32)
-    return points_in_body(stored[..., :3], options)
+    return stored[..., :3]

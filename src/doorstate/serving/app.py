@@ -14,7 +14,7 @@ from doorstate import __version__
 from doorstate.inference.network_predictor import NetworkPredictor
 from doorstate.inference.predictor import Predictor
 from doorstate.inference.serialization import prediction_to_dict, require_points
-from doorstate.io.readers import parse_cloud
+from doorstate.io.readers import parse_posed_cloud
 from doorstate.serving.errors import STATUS_DESCRIPTIONS, add_error_handlers
 from doorstate.serving.lingering_close import LingeringClose
 from doorstate.serving.models import ErrorResponse, HealthResponse, PredictionResponse
@@ -88,8 +88,9 @@ def create_app(predictor: Predictor, limits: Limits | None = None) -> FastAPI:
         options, suffix = query.read_options(), query.suffix(request.headers.get("content-type", ""))
 
         def predict_file(content: bytes) -> dict[str, Any]:
-            prediction = require_points(predictor(parse_cloud(content, suffix, options)))
-            return prediction_to_dict(prediction, format_parameter)
+            cloud, pose = parse_posed_cloud(content, suffix, options)
+            prediction = require_points(predictor(cloud))
+            return prediction_to_dict(prediction, format_parameter) | {"sensor_pose": pose.to_dict()}
 
         return await queue.run(request, predict_file)
 

@@ -8,6 +8,19 @@ from pydantic import BaseModel, Field
 from doorstate.types import STATES
 
 
+class SensorPoseResponse(BaseModel):
+    """Pose of a camera, and where its parts come from: assumed, given, the file's VIEWPOINT, or a depth image."""
+
+    axes: str = Field(description="Directions of x, y and z in the frame of the camera, such as flu.")
+    axes_from: str = Field(description="Where the axes come from.")
+    roll_deg: float = Field(description="Clockwise rotation of the camera, seen from behind.")
+    pitch_deg: float = Field(description="Angle by which the camera looks down.")
+    tilt_from: str = Field(description="Where roll and pitch come from.")
+    position_m: list[float] | None = Field(
+        None, description="Position of the camera in the frame of the points, from VIEWPOINT."
+    )
+
+
 class PredictionResponse(BaseModel):
     """Prediction for one file: the object that `doorstate predict --json` prints, without the file name."""
 
@@ -18,6 +31,7 @@ class PredictionResponse(BaseModel):
     probabilities: dict[str, float] = Field(description="Probability of each state.")
     points: int = Field(description="Number of points that the prediction is based on.")
     milliseconds: float = Field(description="Time of the prediction, without reading the file.")
+    sensor_pose: SensorPoseResponse = Field(description="Pose of the camera that was applied to the points.")
     reason: str = Field("", description="Reason why there is no state.")
     opening_angle_deg: float | None = Field(
         None, description="Opening angle of the leaf. This and the following fields depend on the method."

@@ -9,9 +9,9 @@ from fastapi import HTTPException
 from pydantic import BaseModel, ConfigDict, Field
 
 from doorstate.io.camera import pinhole_from_numbers
-from doorstate.io.depth import ROLLS_DEG
 from doorstate.io.options import ReadOptions, metres_per_unit, unit_name
 from doorstate.io.readers import CLOUD_SUFFIXES
+from doorstate.io.rotations import parse_quaternion
 from doorstate.types import UNITS_M
 
 _FORMATS = [suffix.lstrip(".") for suffix in CLOUD_SUFFIXES]
@@ -19,6 +19,7 @@ _FORMAT_OF_SUBTYPE = {"plain": "txt"}  # media subtypes that differ from the suf
 # Parameters that are not spelled like the parameter of the library function they are passed to.
 _NAMES = {
     "roll_deg": "roll",
+    "pitch_deg": "pitch",
     "depth_scale_m": "depth_scale",
     "units_m": "units",
     "intrinsics": "fx, fy, cx and cy",
@@ -36,16 +37,18 @@ class PredictQuery(BaseModel):
         json_schema_extra={"enum": [*_FORMATS]},
     )
     filename: str | None = Field(None, description="File name; its suffix gives the format.")
-    frame: str = Field(
-        "body",
-        description="Axes of clouds: body (x forward, y left, z up) or optical (z forward, y down).",
-        json_schema_extra={"enum": ["body", "optical"]},
+    axes: str = Field(
+        "auto",
+        description="Directions of x, y and z in clouds: ros (flu), optical (rdf), opengl (rub), or three letters among"
+        " f b l r u d; auto is ros.",
     )
-    roll: int = Field(
-        0,
-        description="Clockwise rotation of the camera, seen from behind, in degrees.",
-        json_schema_extra={"enum": list(ROLLS_DEG)},
+    roll: float = Field(0.0, description="Clockwise rotation of the camera, seen from behind, in degrees.")
+    pitch: float = Field(0.0, description="Angle by which the camera looks down, in degrees.")
+    quaternion: str | None = Field(
+        None,
+        description="In place of roll and pitch: x,y,z,w of the rotation from the points' frame to a level frame.",
     )
+    ignore_viewpoint: bool = Field(False, description="Ignore VIEWPOINT of PCD files.")
     units: str = Field(
         "m",
         description="Length unit of clouds and of floating point depth images.",
@@ -65,8 +68,16 @@ class PredictQuery(BaseModel):
             CameraError: the camera is impossible.
         """
         camera = pinhole_from_numbers(self.fx, self.fy, self.cx, self.cy)
-        units_m = metres_per_unit(self.units)
-        return ReadOptions(self.frame, self.roll, camera, self.depth_scale, units_m)  # type: ignore[arg-type]
+        return ReadOptions(
+            axes=self.axes,
+            roll_deg=self.roll,
+            pitch_deg=self.pitch,
+            quaternion=None if self.quaternion is None else parse_quaternion(self.quaternion),
+            ignore_viewpoint=self.ignore_viewpoint,
+            intrinsics=camera,
+            depth_scale_m=self.depth_scale,
+            units_m=metres_per_unit(self.units),
+        )
 
     def suffix(self, content_type: str) -> str:
         """Return the suffix of the file: from `format`, or else from `filename`, or else from the Content-Type.
@@ -93,4 +104,6 @@ def format_parameter(name: str, value: object = None) -> str:
     if name == "units_m" and isinstance(value, float):
         value = unit_name(value)
     name = _NAMES.get(name, name)
+    if value is True:
+        value = "true"
     return name if value is None else f"{name}={value}"

@@ -31,8 +31,10 @@ _HIDDEN_COLUMNS = {
     "cx",
     "cy",
     "depth_unit_m",
-    "frame",
+    "axes",
     "roll_deg",
+    "pitch_deg",
+    "quaternion",
     "source",
     "licence",
 }

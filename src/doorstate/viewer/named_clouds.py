@@ -17,7 +17,8 @@ from doorstate.dataset.store import PreparedDataset, is_prepared, open_dataset
 from doorstate.errors import DatasetError, DoorstateError
 from doorstate.io.find import find_clouds
 from doorstate.io.options import DEFAULT_OPTIONS, ReadOptions
-from doorstate.io.readers import read_cloud
+from doorstate.io.readers import read_posed_cloud
+from doorstate.io.sensor_pose import SensorPose
 from doorstate.simulation.frames import replay
 from doorstate.simulation.manifest import MANIFEST_FILE, unflatten
 from doorstate.simulation.writer import is_simulated
@@ -31,6 +32,7 @@ class NamedCloud(NamedTuple):
     cloud: Points | DoorstateError  # input of a `Predictor`, or the reason why there is none
     parts: NDArray[np.uint8] | None = None  # (N,) part of each point of the flattened cloud
     truth: str = ""  # true state
+    pose: SensorPose | None = None  # that was applied to the points of a file or message
 
 
 def find_named_clouds(
@@ -66,7 +68,8 @@ def read_named_cloud(path: Path, folder: Path, options: ReadOptions) -> NamedClo
     """Read a file; its name is the path relative to an absolute folder."""
     name = path.absolute().relative_to(folder).as_posix()
     try:
-        return NamedCloud(name, read_cloud(path, options))
+        cloud, pose = read_posed_cloud(path, options)
+        return NamedCloud(name, cloud, pose=pose)
     except DoorstateError as error:
         return NamedCloud(name, error)
 

@@ -57,8 +57,8 @@ def name_messages(messages: Iterable[StampedCloud]) -> Iterator[tuple[float, Nam
     """Yield stamps in seconds and clouds of a bag; a bag that is damaged from somewhere on ends with the error."""
     stamp_s = 0.0
     try:
-        for stamp_s, _, cloud in messages:
-            yield stamp_s, NamedCloud(f"{stamp_s:.3f} s", cloud)
+        for stamp_s, _, cloud, pose in messages:
+            yield stamp_s, NamedCloud(f"{stamp_s:.3f} s", cloud, pose=pose)
     except CloudReadError as error:
         yield stamp_s, NamedCloud("end", error)
 
