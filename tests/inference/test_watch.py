@@ -260,7 +260,8 @@ def test_parameters_choose_the_predictor(weights: object) -> None:
     ({"points": True}, "points"),
     ({"budget_ms": float("inf")}, "budget_ms"),
     ({"axes": "map"}, "axes"),
-    ({"roll": "left"}, "roll"),
+    ({"roll": 450.0}, "roll"),
+    ({"quaternion": "1 2"}, "quaternion"),
     ({"silence_s": 0.0}, "silence_s"),
 ])  # fmt: skip
 def test_a_wrong_parameter_is_one_line(parameters: dict[str, Any], field: str | None) -> None:

@@ -44,6 +44,7 @@ class DoorWatch:
     def __init__(self, settings: WatchSettings, predictor: Predictor | None = None) -> None:
         self._settings = settings
         self._type = MESSAGE_TYPES[settings.input]
+        self._options = settings.read_options()
         self._predictor = predictor or settings.load_predictor()
         self._camera: Intrinsics | CameraError = CameraError("no CameraInfo has come yet")
         self._due_s = -math.inf
@@ -132,7 +133,7 @@ class DoorWatch:
         return centre, pose, Prediction.abstain(abstention)
 
     def _cloud(self, message: Any) -> PosedCloud:
-        options = self._settings.read_options()
+        options = self._options
         if self._type != CLOUD:
             if isinstance(self._camera, CameraError):
                 raise self._camera

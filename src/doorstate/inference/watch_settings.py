@@ -9,7 +9,7 @@ from typing import Any, Literal
 from pydantic import ConfigDict, Field, ValidationError
 
 from doorstate._models import FrozenModel
-from doorstate.errors import ConfigError, unknown_name
+from doorstate.errors import CameraError, ConfigError, unknown_name
 from doorstate.inference.gate import DEFAULT_GATE
 from doorstate.inference.predictor import DEFAULT_NETWORK, Predictor
 from doorstate.io.messages import CLOUD, COMPRESSED_IMAGE, IMAGE
@@ -96,10 +96,15 @@ def parse_settings(parameters: Mapping[str, Any]) -> WatchSettings:
         ConfigError: a parameter does not exist, or cannot have this value.
     """
     try:
-        return WatchSettings(**parameters)
+        settings = WatchSettings(**parameters)
+        settings.read_options()
     except ValidationError as error:
         problem = error.errors()[0]
         name = str(problem["loc"][0])
         if problem["type"] == "extra_forbidden":
             raise unknown_name("parameter", name, list(WatchSettings.model_fields)) from error
         raise ConfigError(f"{problem['input']!r}: {problem['msg'].lower()}", field=name) from error
+    except CameraError as error:
+        name = (error.field or "").removesuffix("_deg").removesuffix("_m")
+        raise ConfigError(error.message, field=name, expected=error.expected) from error
+    return settings

@@ -21,7 +21,7 @@ from doorstate.io.png import parse_depth_png
 from doorstate.io.sensor_pose import PosedCloud
 from doorstate.io.size_limits import check_point_count
 from doorstate.io.text import parse_table
-from doorstate.io.viewpoint import parse_viewpoint
+from doorstate.io.viewpoint import read_viewpoint
 from doorstate.types import Points
 
 _PARSERS: dict[str, Callable[[bytes], NDArray[Any]]] = {
@@ -101,7 +101,7 @@ def parse_posed_cloud(data: bytes, suffix: str, options: ReadOptions = DEFAULT_O
         check_point_count(math.prod(stored.shape if is_depth else stored.shape[:-1]))
         if is_depth:
             return points_from_depth(stored, options)
-        viewpoint = parse_viewpoint(data) if suffix == ".pcd" and not options.ignore_viewpoint else None
+        viewpoint = read_viewpoint(data) if suffix == ".pcd" and not options.ignore_viewpoint else None
         return points_in_body(_rows(stored), options, viewpoint=viewpoint)
     except DoorstateError:
         raise

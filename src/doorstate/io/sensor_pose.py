@@ -76,8 +76,8 @@ class SensorPose:
         values: dict[str, Any] = {
             "axes": self.axes,
             "axes_from": self.axes_from,
-            "roll_deg": round(self.roll_deg, 3),
-            "pitch_deg": round(self.pitch_deg, 3),
+            "roll_deg": round(self.roll_deg, 3) + 0.0,  # no -0.0
+            "pitch_deg": round(self.pitch_deg, 3) + 0.0,
             "tilt_from": self.tilt_from,
         }
         return values | ({"position_m": [round(x, 4) for x in self.position]} if any(self.position) else {})

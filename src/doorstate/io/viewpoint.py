@@ -3,16 +3,10 @@
 
 from __future__ import annotations
 
-import math
-import re
 from typing import NamedTuple
 
-from doorstate.errors import CameraError
+from doorstate.io.pcd_header import IDENTITY, read_pcd_header
 from doorstate.io.rotations import Quaternion
-
-_LINE = re.compile(rb"^[ \t]*VIEWPOINT[ \t]+([^\r\n#]*)", re.MULTILINE)
-_DATA = re.compile(rb"^[ \t]*DATA\b", re.MULTILINE)
-_MAX_HEADER_BYTES = 1 << 20
 
 
 class Viewpoint(NamedTuple):
@@ -22,28 +16,17 @@ class Viewpoint(NamedTuple):
     quaternion: Quaternion  # x, y, z, w: R_points_sensor
 
 
-def parse_viewpoint(data: bytes) -> Viewpoint | None:
-    """Return the viewpoint of a PCD file; None if the header has none, the identity, or zeros only.
+def read_viewpoint(data: bytes) -> Viewpoint | None:
+    """Return the viewpoint of a PCD file; None if it is the identity or zeros only, as tools without a pose write.
 
-    Source: PCL, "The PCD file format": VIEWPOINT is tx ty tz qw qx qy qz, identity by default.
+    Source: PCL, "The PCD file format": VIEWPOINT is the acquisition viewpoint of the points, a translation and a
+    quaternion, by default the identity.
 
     Raises:
-        CameraError: it is not seven finite numbers.
+        CloudReadError: as in `read_pcd_header`.
     """
-    header = data[:_MAX_HEADER_BYTES]
-    if end := _DATA.search(header):
-        header = header[: end.start()]
-    if (line := _LINE.search(header)) is None:
+    pose = read_pcd_header(data).viewpoint
+    if pose == IDENTITY or not any(pose):
         return None
-    try:
-        x, y, z, qw, qx, qy, qz = (float(word) for word in line[1].split())
-    except ValueError:
-        x = math.nan
-    if not math.isfinite(x) or not all(map(math.isfinite, (y, z, qw, qx, qy, qz))):
-        raise CameraError(
-            "VIEWPOINT is not seven numbers: tx ty tz qw qx qy qz", suggestions={"ignore_viewpoint": True}
-        )
-    # Zeros only: written by tools that do not know the pose.
-    if (x, y, z) == (0, 0, 0) and (qx, qy, qz) == (0, 0, 0):
-        return None
+    x, y, z, qw, qx, qy, qz = pose
     return Viewpoint((x, y, z), (qx, qy, qz, qw))
