@@ -60,7 +60,7 @@ def test_unknown_options_and_commands_are_exit_code_2(run: Run) -> None:
     ("arguments", "expected_code", "name"),
     [
         (["predict", "gone.pcd"], 1, "gone.pcd"),
-        (["predict", ".", "--roll", "45"], 2, "45"),
+        (["predict", ".", "--roll", "450"], 2, "450"),
         (["predict", ".", "--fx", "-5", "--fy", "5", "--cx", "2", "--cy", "2"], 2, "fx"),
         (["view", ".", "--rule", "plane_state", "--network", "pointnet2"], 2, "plane_state"),
         (["serve", "--network", "pointnet2", "--weights", "x.safetensors"], 2, "pointnet2, x"),

@@ -31,7 +31,6 @@ class PredictionResponse(BaseModel):
     probabilities: dict[str, float] = Field(description="Probability of each state.")
     points: int = Field(description="Number of points that the prediction is based on.")
     milliseconds: float = Field(description="Time of the prediction, without reading the file.")
-    sensor_pose: SensorPoseResponse = Field(description="Pose of the camera that was applied to the points.")
     reason: str = Field("", description="Reason why there is no state.")
     opening_angle_deg: float | None = Field(
         None, description="Opening angle of the leaf. This and the following fields depend on the method."
@@ -45,6 +44,7 @@ class PredictionResponse(BaseModel):
     )
     opening_width_m: float | None = Field(None, description="Width of the door frame.")
     passable_width_m: float | None = Field(None, description="Free width between leaf and jamb.")
+    sensor_pose: SensorPoseResponse = Field(description="Pose of the camera that was applied to the points.")
 
 
 class HealthResponse(BaseModel):
