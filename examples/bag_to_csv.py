@@ -35,7 +35,7 @@ def main(recording: Path, table: Path) -> None:
             prediction = predictor(cloud)
             if prediction.state not in (None, previous):
                 previous = prediction.state
-                rows.writerow([f"{stamp_s:.3f}", previous, f"{prediction.probabilities[previous]:.3f}"])
+                rows.writerow([f"{stamp_s:.3f}", previous, f"{prediction.probability:.3f}"])
     print(f"{topic.messages} messages of {topic.name}: changes in {table}")
 
 

@@ -26,7 +26,7 @@ def main(path: Path) -> int:
     if prediction.state is None:  # too much is missing, or the network is unsure
         print(f"unknown: {prediction.reason}")
         return 2
-    print(f"{prediction.state}, probability {prediction.probabilities[prediction.state]:.2f}")
+    print(f"{prediction.state}, probability {prediction.probability:.2f}")
     return 0 if prediction.state == DoorState.OPEN else 1
 
 

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from doorstate._jobs import Progress
 from doorstate.evaluation.table import Table, number
 from doorstate.inference.network_predictor import NetworkPredictor
 from doorstate.inference.prediction import Prediction
-from doorstate.types import STATES
 
 from .frames import reference_frames
 
@@ -27,8 +27,8 @@ class ThinningResult(NamedTuple):
 
 def measure_thinning(network: str, count: int, progress: Progress) -> list[ThinningResult]:
     """Return the predictions of packaged weights for simulated doors, with both samplings."""
-    thinned = NetworkPredictor.from_weights(network)
-    full = NetworkPredictor.from_weights(network, thin=False)
+    thinned = NetworkPredictor.from_weights(network, gate=None)
+    full = NetworkPredictor.from_weights(network, thin=False, gate=None)
     return [
         ThinningResult(row.state, thinned(frame.points), full(frame.points))
         for row, frame in reference_frames(count, progress)
@@ -38,7 +38,7 @@ def measure_thinning(network: str, count: int, progress: Progress) -> list[Thinn
 def thinning_table(results: Sequence[ThinningResult]) -> Table:
     """Return one row: equal and correct states, and differences of the probabilities."""
     differences = [
-        max(abs(result.thinned.probabilities[state] - result.full.probabilities[state]) for state in STATES)
+        float(np.abs(_probabilities(result.thinned) - _probabilities(result.full)).max())
         for result in results
     ]
     row = (
@@ -56,3 +56,7 @@ def thinning_table(results: Sequence[ThinningResult]) -> Table:
         "Packaged weights on simulated doors that they were not trained on; differences are those of the probability "
         "that differs most.",
     )
+
+
+def _probabilities(prediction: Prediction) -> NDArray[np.float64]:
+    return np.array(list((prediction.raw_probabilities or {}).values()))

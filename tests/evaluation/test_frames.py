@@ -72,6 +72,13 @@ def test_a_method_abstains_from_a_cloud_it_cannot_use(results: FrameResults) -> 
     assert set(results.misclassified_by(4)) == {"net", "plane_state"}
 
 
+def test_probabilities_are_those_of_a_network_that_ran(results: FrameResults) -> None:
+    rows = results.predictions.set_index(["method", "sample_id"])[["p_closed", "p_semi_open", "p_open"]]
+    assert rows.loc["plane_state"].isna().all(axis=None)
+    assert rows.loc[("net", "tiny.pcd")].isna().all()
+    assert rows.loc[("net", "closed.pcd")].sum() == pytest.approx(1)
+
+
 def test_progress_counts_files(predictors: Predictors, labelled: list[LabelledFrame]) -> None:
     calls: list[tuple[int, int]] = []
     rule = {"plane_state": predictors["plane_state"]}
@@ -117,7 +124,8 @@ def test_a_column_of_the_index_does_not_replace_a_prediction(
 ) -> None:
     frame = replace(labelled[0], columns={"predicted": "open", "p_open": "1", "note": "kept"})
     (row,) = evaluate_frames({"plane_state": predictors["plane_state"]}, [frame]).joined.to_dict("records")
-    assert (row["predicted"], row["p_closed"], row["note"]) == ("closed", 1, "kept")
+    assert (row["predicted"], row["note"]) == ("closed", "kept")
+    assert math.isnan(row["p_open"])
 
 
 def test_frames_that_most_methods_missed_come_first(results: FrameResults) -> None:

@@ -82,14 +82,22 @@ def _network(gate: Gate | None) -> NetworkPredictor:
 
 def _predict(predictor: Predictor, cloud: Points, min_points: int) -> str:
     prediction = predictor(cloud)
-    probabilities = list(prediction.probabilities.values())
     json.dumps(prediction_to_dict(prediction), allow_nan=False)
     if prediction.state is None:
         assert prediction.abstention is not None
         check_line(prediction.reason)
+        assert (prediction.probabilities, prediction.opening_angle_deg, prediction.frame) == (
+            None,
+            None,
+            None,
+        )
         return prediction.abstention.code
-    assert math.isclose(sum(probabilities), 1, abs_tol=1e-5)
-    assert min(probabilities) >= 0
+    if isinstance(predictor, RulePredictor):
+        assert prediction.probabilities is None
+    else:
+        assert prediction.probabilities is not None
+        assert math.isclose(sum(prediction.probabilities.values()), 1, abs_tol=1e-5)
+        assert min(prediction.probabilities.values()) >= 0
     measured = cloud[is_measured(np.asarray(cloud, np.float32))]
     assert len(np.unique(measured, axis=0)) >= min_points
     return "predicted"

@@ -17,7 +17,10 @@ UNKNOWN = Prediction.abstain(Abstention("hole", {"share": 0.3, "free_reach_m": 4
 def predict(state: DoorState, probability: float = 0.9) -> Prediction:
     rest = (1 - probability) / 2
     return Prediction(
-        state, {other: probability if other == state else rest for other in DoorState}, 1024, 1.0
+        state,
+        1024,
+        1.0,
+        raw_probabilities={other: probability if other == state else rest for other in DoorState},
     )
 
 

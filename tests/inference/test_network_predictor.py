@@ -148,7 +148,7 @@ def test_missing_data_give_no_state_and_a_reason(small_dataset: PreparedDataset)
     assert prediction.state is None
     assert prediction.abstention is not None
     assert prediction.abstention.code == "narrow_view"
-    assert set(prediction.probabilities.values()) == {0.0}
+    assert (prediction.probabilities, prediction.raw_probabilities) == (None, None)
     assert prediction.num_points == 160
     limited = NetworkPredictor(TorchBackend(network, card), gate=None)(half)
     assert limited.state is not None
@@ -166,9 +166,7 @@ def test_a_batch_gives_the_predictions_of_its_clouds(
     together, alone = predictor.batch(clouds), [predictor(cloud) for cloud in clouds]
     for one, other in zip(together, alone, strict=True):
         assert (one.state, one.num_points, one.reason) == (other.state, other.num_points, other.reason)
-        np.testing.assert_allclose(
-            list(one.probabilities.values()), list(other.probabilities.values()), atol=1e-5
-        )
+        assert one.probabilities == pytest.approx(other.probabilities, abs=1e-5)
     assert [prediction.state is None for prediction in together] == [False, False, True, False, False, False]
     assert predictor.batch([]) == []
 
@@ -220,8 +218,9 @@ def headed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_heads_are_in_metres_and_degrees(headed: Path, small_dataset: PreparedDataset) -> None:
     predictor = NetworkPredictor.from_weights(headed)
     cloud = replay(unflatten(small_dataset.rows[5])).points
-    prediction = predictor(cloud)
     assert isinstance(predictor.backend.network, PointNetwork)
+    torch.nn.init.constant_(predictor.backend.network.heads["door"].linear.bias, 9.0)  # type: ignore[union-attr, arg-type]
+    prediction = predictor(cloud)
     prepared = prepare_cloud(cloud, CloudSpec(num_points=160, thin=True)).points[None]
     with torch.no_grad():
         outputs = head_outputs(predictor.backend.network, torch.from_numpy(normalize(prepared)))
@@ -231,7 +230,9 @@ def test_heads_are_in_metres_and_degrees(headed: Path, small_dataset: PreparedDa
     )
     assert prediction.door_probability == pytest.approx(columns["p_door"][0])
     assert prediction.opening_angle_deg == pytest.approx(columns["opening_angle_deg"][0])
-    assert prediction.hinge == ("left" if columns["p_hinge_left"][0] >= 0.5 else "right")
+    p_left = columns["p_hinge_left"][0]
+    assert prediction.hinge == ("left" if p_left >= 0.5 else "right")
+    assert prediction.hinge_probability == pytest.approx(max(p_left, 1 - p_left))
     assert prediction.frame is not None
     assert prediction.frame.x_m == pytest.approx(columns["door_x_m"][0], abs=1e-5)
     assert prediction.frame.yaw_deg == pytest.approx(columns["door_yaw_deg"][0])
@@ -246,7 +247,7 @@ def test_a_batch_gives_the_heads_of_its_clouds(headed: Path, small_dataset: Prep
     for alone, together in zip(map(predictor, clouds), predictor.batch(clouds), strict=True):
         assert alone.state == together.state
         assert alone.num_points == together.num_points
-        assert together.frame == pytest.approx(alone.frame, abs=1e-4)
+        assert together.frame == (alone.frame and pytest.approx(alone.frame, abs=1e-4))
 
 
 def test_no_door_gives_no_state(headed: Path, small_dataset: PreparedDataset) -> None:
@@ -279,7 +280,8 @@ def test_an_unsure_network_abstains_below_the_limit_of_its_weights(small_dataset
                 "probability": best,
                 "min_probability": least,
             }
-        assert limited.probabilities == prediction.probabilities
+        assert limited.raw_probabilities == prediction.probabilities
+        assert (limited.probabilities is None) != has_state
 
 
 def test_points_beyond_the_depth_of_the_training_data_are_ignored(small_dataset: PreparedDataset) -> None:

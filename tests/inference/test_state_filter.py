@@ -131,6 +131,13 @@ def test_an_earlier_stamp_resets_and_the_same_stamp_adds_nothing() -> None:
     assert reset.since_s == 5.0
 
 
+def test_the_state_of_a_rule_counts_as_a_certain_one() -> None:
+    rule = Prediction(OPEN, 1000, 1.0)
+    ((_, certain), (_, of_rule)) = (after(stamped((2, frame))) for frame in (predict(OPEN, 1.0), rule))
+    assert of_rule == certain
+    assert of_rule.probabilities["open"] > 0.5
+
+
 def test_impossible_parameters_and_stamps_are_errors() -> None:
     for wrong in (
         {"stay_probability": 0.3},

@@ -237,7 +237,7 @@ def test_values_and_text_have_everything(clouds: list[Points]) -> None:
     report = [watch.process(cloud_message(clouds[1], START_NS + k * 4 * 10**8), 0) for k in range(4)][-1]
     values = report.values
     assert values["state"] == values["raw_state"] == "semi_open"
-    assert {name: float(values[name]) for name in STATES} == {"closed": 0, "semi_open": 1, "open": 0}
+    assert values.keys().isdisjoint(STATES)  # a rule estimates no probabilities
     assert sum(float(values[f"filtered_{name}"]) for name in STATES) == pytest.approx(1, abs=1e-5)
     assert 15 < float(values["opening_angle_deg"]) < 65
     assert 0 < float(values["held_s"]) <= 0.8

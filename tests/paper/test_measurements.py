@@ -33,8 +33,8 @@ def test_thinning_gives_probabilities_of_both_samplings() -> None:
     results = measure_thinning("ogurob-pointnet2", 3, no_progress)
     assert len(results) == 3
     for result in results:
-        assert sum(result.thinned.probabilities.values()) == pytest.approx(1)
-        assert sum(result.full.probabilities.values()) == pytest.approx(1)
+        assert sum(result.thinned.raw_probabilities.values()) == pytest.approx(1)
+        assert sum(result.full.raw_probabilities.values()) == pytest.approx(1)
     assert thinning_table(results).rows[0][0] == "3"
 
 

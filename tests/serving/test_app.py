@@ -49,7 +49,7 @@ def test_abstention_has_a_reason_and_no_state() -> None:
         response = client.post("/predict?format=npy", content=NPY).raise_for_status().json()
     assert response["state"] is None
     assert "0.20 m" in response["reason"]
-    fields = {"state", "probabilities", "points", "milliseconds", "reason", "sensor_pose"}
+    fields = {"state", "points", "milliseconds", "reason", "sensor_pose"}
     assert set(response) == fields <= set(PredictionResponse.model_fields)
 
 

@@ -96,7 +96,7 @@ def score_calibration(results: Results) -> pd.DataFrame:
         cross_entropy and brier score with endings `_raw` and `_scaled`.
     """
     rows = []
-    for method in results.methods:
+    for method in results.networks:
         calibration = calibrate(results, method)
         if calibration is None:
             continue

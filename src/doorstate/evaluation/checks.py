@@ -26,8 +26,8 @@ def check_predictions(results: Results, path_of: Callable[[str, int], Path]) -> 
         path_of: file with the predictions of a method and fold, for errors.
 
     Raises:
-        RunError: a label is unknown, a probability is not finite, a sample is tested twice or has another role, a
-            state differs from the manifest, or test samples are missing.
+        RunError: a label is unknown, a probability of a network is not finite, a sample is tested twice or has another
+            role, a state differs from the manifest, or test samples are missing.
     """
     table = results.predictions
     groups: dict[tuple[str, int], Any] = {}
@@ -38,7 +38,7 @@ def check_predictions(results: Results, path_of: Callable[[str, int], Path]) -> 
         if not 0 <= record.fold < len(results.splits):
             raise RunError(f"no fold {record.fold} in the splits", path=path, field="fold")
         run = table.loc[groups.pop((record.method, record.fold), [])]
-        _check_labels(run, path)
+        _check_labels(run, path, is_rule=record.method in results.rules)
         _check_roles(run, results.splits[record.fold], record.fold, path)
         _check_states(run, results.manifest["state"], path)
         _check_count(run, results, record.fold, path)
@@ -56,7 +56,7 @@ def check_predictions(results: Results, path_of: Callable[[str, int], Path]) -> 
         )
 
 
-def _check_labels(run: pd.DataFrame, path: Path) -> None:
+def _check_labels(run: pd.DataFrame, path: Path, *, is_rule: bool) -> None:
     door = run["state"] != NO_DOOR
     for column, labels in (("state", STATES), ("predicted", PREDICTED_LABELS)):
         unknown = run.loc[door & ~run[column].isin(labels), column]
@@ -68,7 +68,7 @@ def _check_labels(run: pd.DataFrame, path: Path) -> None:
                 expected=f"one of {', '.join(labels)}",
                 hint=_AGAIN,
             )
-    if not np.isfinite(run.loc[door, list(PROBABILITY_COLUMNS)].to_numpy()).all():
+    if not is_rule and not np.isfinite(run.loc[door, list(PROBABILITY_COLUMNS)].to_numpy()).all():
         raise RunError("a probability is not finite", path=path, hint=_AGAIN)
 
 

@@ -67,8 +67,8 @@ def summarize_errors(results: Results) -> pd.DataFrame:
 
 
 def order_errors(errors: pd.DataFrame) -> pd.DataFrame:
-    """Sort rows of `Results.errors`: decidable ones first, then by falling confidence."""
-    order = errors.assign(undecidable=is_undecidable(errors), descending=-errors["confidence"])
+    """Sort rows of `Results.errors`: decidable ones first, then by falling confidence; states of rules are certain."""
+    order = errors.assign(undecidable=is_undecidable(errors), descending=-errors["confidence"].fillna(1.0))
     order = order.sort_values(["undecidable", "descending", "sample_id"], kind="stable")
     return errors.loc[order.index]
 

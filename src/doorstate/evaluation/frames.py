@@ -21,6 +21,7 @@ from doorstate.inference.prediction import Prediction
 from doorstate.inference.predictor import Predictor
 from doorstate.types import ABSTAINED, STATES
 
+_NO_PROBABILITIES = dict.fromkeys(STATES, math.nan)  # of a rule, and of a cloud that was not evaluated
 Predictors = Mapping[str, Predictor]
 
 
@@ -41,7 +42,10 @@ class FrameResults:
                 "sample_id": frame.file,
                 "state": frame.label,
                 "predicted": prediction.label,
-                **{f"p_{state}": prediction.probabilities[state] for state in STATES},
+                **{
+                    f"p_{state}": p
+                    for state, p in (prediction.raw_probabilities or _NO_PROBABILITIES).items()
+                },
                 "p_door": _number(prediction.door_probability),
                 "opening_angle_deg": _number(prediction.opening_angle_deg),
                 "reason": prediction.reason,

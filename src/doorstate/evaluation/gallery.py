@@ -27,8 +27,8 @@ class WrongPrediction:
     method: str
     fold: int
     predicted: str
-    confidence: float  # probability of the predicted state
-    probabilities: tuple[float, ...]  # in the order of `STATES`
+    confidence: float | None  # probability of the predicted state; None without one
+    probabilities: tuple[float, ...]  # in the order of `STATES`; none of a rule
 
 
 @dataclass(frozen=True)
@@ -111,8 +111,8 @@ def _card(dataset: PreparedDataset, errors: pd.DataFrame) -> SampleCard:
                 row["method"],
                 int(row["fold"]),
                 row["predicted"],
-                float(row["confidence"]),
-                tuple(float(row[name]) for name in PROBABILITY_COLUMNS),
+                float(row["confidence"]) if row["confidence"] > 0 else None,
+                tuple(float(row[name]) for name in PROBABILITY_COLUMNS if not pd.isna(row[name])),
             )
             for _, row in errors.iterrows()
         ),

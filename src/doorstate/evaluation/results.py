@@ -67,7 +67,8 @@ class Results:
     """Finished runs of a comparison, in the order of its methods and folds.
 
     `predictions` has one row for each method, fold, role (test, val) and sample. A sample without a door has a row
-    where a network has further heads; its `predicted` and its probabilities of states are missing.
+    where a network has further heads; its `predicted` and its probabilities of states are missing. So are the
+    probabilities of rules.
     """
 
     config: ComparisonConfig
@@ -136,7 +137,7 @@ class Results:
     def errors(self) -> pd.DataFrame:
         """Rows of `tested` whose state was not predicted, with the probability (`confidence`) of the wrong state.
 
-        The confidence of an abstention is 0.
+        The confidence of an abstention is 0, that of a rule's state NaN.
         """
         errors = self.tested[~self.tested["correct"]]
         confidence = sum(
@@ -166,7 +167,13 @@ def join_manifest(predictions: pd.DataFrame, manifest: pd.DataFrame) -> pd.DataF
 
 
 def order_predictions(predictions: pd.DataFrame, config: ComparisonConfig) -> pd.DataFrame:
-    """Sort rows by method, fold and role, samples as they were, and put the columns that all tables have first."""
+    """Sort rows by method, fold and role, samples as they were, and put the columns that all tables have first.
+
+    A rule estimates no probabilities; tables of doorstate 0.1 have 1 for its state.
+    """
+    is_rule = predictions["method"].isin(config.rules)
+    no_probabilities = {name: predictions[name].mask(is_rule) for name in PROBABILITY_COLUMNS}
+    predictions = predictions.assign(**no_probabilities)
     rank = pd.DataFrame(
         {
             "method": predictions["method"].map({name: rank for rank, name in enumerate(config.methods)}),

@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Literal
+from dataclasses import replace
+from typing import Any
 
 from doorstate.inference.abstention import Abstention
 from doorstate.inference.backends.base import CloudOutputs
@@ -13,7 +14,7 @@ from doorstate.types import DECISION_THRESHOLD, STATES, DoorState
 
 
 def decode(outputs: CloudOutputs, abstain_below: float, num_points: int, milliseconds: float) -> Prediction:
-    """Return the likeliest state with the geometry, or none where the network sees no door or is unsure.
+    """Return the likeliest state with the geometry, or neither where the network sees no door or is unsure.
 
     Args:
         outputs: outputs of the network.
@@ -23,19 +24,15 @@ def decode(outputs: CloudOutputs, abstain_below: float, num_points: int, millise
     """
     heads = outputs.heads
     abstention = _abstention(outputs, abstain_below)
-    return Prediction(
+    prediction = Prediction(
         state=None if abstention else DoorState.from_index(int(outputs.probabilities.argmax())),
-        probabilities={state: float(p) for state, p in zip(STATES, outputs.probabilities, strict=True)},
         num_points=num_points,
         milliseconds=milliseconds,
         abstention=abstention,
-        opening_angle_deg=heads.get("opening_angle_deg"),
+        raw_probabilities={state: float(p) for state, p in zip(STATES, outputs.probabilities, strict=True)},
         door_probability=heads.get("p_door"),
-        hinge=_hinge(heads),
-        frame=_frame(heads),
-        opening_width_m=heads.get("opening_width_m"),
-        passable_width_m=heads.get("passable_width_m"),
     )
+    return prediction if abstention else replace(prediction, **_geometry(heads))
 
 
 def _abstention(outputs: CloudOutputs, abstain_below: float) -> Abstention | None:
@@ -54,13 +51,18 @@ def _abstention(outputs: CloudOutputs, abstain_below: float) -> Abstention | Non
     return None
 
 
-def _hinge(heads: Mapping[str, float]) -> Literal["left", "right"] | None:
-    if "p_hinge_left" not in heads:
-        return None
-    return "left" if heads["p_hinge_left"] >= DECISION_THRESHOLD else "right"
-
-
-def _frame(heads: Mapping[str, float]) -> DoorFrame | None:
-    if "door_x_m" not in heads:
-        return None
-    return DoorFrame(heads["door_x_m"], heads["door_y_m"], heads["door_yaw_deg"])
+def _geometry(heads: Mapping[str, float]) -> dict[str, Any]:
+    """Return the fields of a prediction that describe the door."""
+    fields: dict[str, Any] = {
+        name: heads.get(name) for name in ("opening_angle_deg", "opening_width_m", "passable_width_m")
+    }
+    if "p_hinge_left" in heads:
+        p_left = heads["p_hinge_left"]
+        is_left = p_left >= DECISION_THRESHOLD
+        fields |= {
+            "hinge": "left" if is_left else "right",
+            "hinge_probability": p_left if is_left else 1 - p_left,
+        }
+    if "door_x_m" in heads:
+        fields["frame"] = DoorFrame(heads["door_x_m"], heads["door_y_m"], heads["door_yaw_deg"])
+    return fields

@@ -36,10 +36,11 @@ class DoorReport:
 
     @property
     def values(self) -> dict[str, str]:
-        """All values by name, as text: of this message, and `filtered_*` after the filter."""
+        """All values by name, as text: of this message, without probabilities where it has none, and `filtered_*`."""
         record = prediction_to_dict(self.prediction)
         values = {"state": self.state, "raw_state": record.pop("state") or UNKNOWN, "reason": ""}
-        values |= record.pop("probabilities") | record
+        record.pop("raw_probabilities", None)
+        values |= record.pop("probabilities", {}) | record
         values |= {f"filtered_{name}": round(p, 6) for name, p in self.filtered.probabilities.items()}
         values["held_s"] = 0.0 if self.held_s is None else round(self.held_s, 3)
         return {name: str(value) for name, value in values.items()}

@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
 from doorstate.inference.abstention import Abstention
 from doorstate.rules.base import Detection
-from doorstate.types import ABSTAINED, STATES, DoorState
+from doorstate.types import ABSTAINED, DoorState
 
 
 class DoorFrame(NamedTuple):
@@ -26,17 +27,22 @@ class DoorFrame(NamedTuple):
 class Prediction:
     """State of the door in one cloud, or the reason why there is none.
 
-    Geometry is None where the method does not estimate it.
+    Numbers that the method does not estimate are None. Without a state there are no probabilities and no geometry.
     """
 
     state: DoorState | None
-    probabilities: dict[str, float]  # by state; all zero without a state from a rule or from the gate
     num_points: int  # points that the method evaluated
     milliseconds: float  # from the raw cloud to this prediction
     abstention: Abstention | None = None  # set exactly where `state` is None
+    raw_probabilities: Mapping[str, float] | None = (
+        None  # of the network by state, even where its state is refused
+    )
+    door_probability: float | None = (
+        None  # that the cloud shows a door at all, even where the state is refused
+    )
     opening_angle_deg: float | None = None
-    door_probability: float | None = None  # that the cloud shows a door at all
     hinge: Literal["left", "right"] | None = None  # as seen from the camera
+    hinge_probability: float | None = None  # that the hinge is on this side
     frame: DoorFrame | None = None
     opening_width_m: float | None = None
     passable_width_m: float | None = None  # between leaf and jamb
@@ -48,11 +54,21 @@ class Prediction:
         return str(self.state or ABSTAINED)
 
     @property
+    def probabilities(self) -> dict[str, float] | None:
+        """Probabilities by state; None without a state, and for a rule, which does not estimate any."""
+        return None if self.state is None or self.raw_probabilities is None else dict(self.raw_probabilities)
+
+    @property
+    def probability(self) -> float | None:
+        """Probability of the state; None where there are no `probabilities`."""
+        return None if self.state is None or self.probabilities is None else self.probabilities[self.state]
+
+    @property
     def reason(self) -> str:
         """Sentence of the abstention; empty with a state."""
         return "" if self.abstention is None else str(self.abstention)
 
     @classmethod
     def abstain(cls, abstention: Abstention, num_points: int = 0, milliseconds: float = 0.0) -> Prediction:
-        """Return a prediction without a state."""
-        return cls(None, dict.fromkeys(STATES, 0.0), num_points, milliseconds, abstention)
+        """Return a prediction without a state, of a cloud that no method has evaluated."""
+        return cls(None, num_points, milliseconds, abstention)

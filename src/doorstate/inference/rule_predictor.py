@@ -16,7 +16,7 @@ from doorstate.inference.prediction import Prediction
 from doorstate.inference.predictor import Predictor
 from doorstate.rules import create_rule
 from doorstate.rules.base import Rule, measured_points
-from doorstate.types import STATES, Points
+from doorstate.types import Points
 
 
 class RulePredictor(Predictor):
@@ -48,7 +48,7 @@ class RulePredictor(Predictor):
         return f"rule {self.name}"
 
     def __call__(self, cloud: Points) -> Prediction:
-        """Predict the state of the door in a cloud, or abstain with a reason; a state has probability 1.
+        """Predict the state of the door in a cloud, or abstain with a reason; there are no probabilities.
 
         Args:
             cloud: (N, 3) or organized (H, W, 3) metres, x forward, y left, z up, NaN where nothing was measured.
@@ -66,12 +66,14 @@ class RulePredictor(Predictor):
         if abstention is not None:
             return Prediction.abstain(abstention, num_points, _milliseconds_since(started))
         result = self.rule(np.asarray(cloud))
+        milliseconds = _milliseconds_since(started)
+        if result.state is None:
+            abstention = Abstention("no_rule_result", message=result.reason)
+            return Prediction(None, num_points, milliseconds, abstention, detections=result.detections)
         return Prediction(
             state=result.state,
-            probabilities={state: float(result.state == state) for state in STATES},
             num_points=num_points,
-            milliseconds=_milliseconds_since(started),
-            abstention=Abstention("no_rule_result", message=result.reason) if result.state is None else None,
+            milliseconds=milliseconds,
             opening_angle_deg=result.opening_angle_deg,
             opening_width_m=result.opening_width_m,
             detections=result.detections,

@@ -17,16 +17,17 @@ def prediction_to_dict(
 ) -> dict[str, Any]:
     """Return a prediction as JSON values; fields without a value are left out.
 
+    `raw_probabilities` are those of a network whose state is refused.
+
     Args:
         prediction: prediction of a network or a rule.
         parameter: writes a parameter that a reason suggests as the surface spells it.
     """
-    record: dict[str, Any] = {
-        "state": None if prediction.state is None else str(prediction.state),
-        "probabilities": {state: round(p, 6) for state, p in prediction.probabilities.items()},
-        "points": prediction.num_points,
-        "milliseconds": round(prediction.milliseconds, 3),
-    }
+    record: dict[str, Any] = {"state": None if prediction.state is None else str(prediction.state)}
+    if prediction.raw_probabilities is not None:
+        name = "raw_probabilities" if prediction.state is None else "probabilities"
+        record[name] = {state: round(p, 6) for state, p in prediction.raw_probabilities.items()}
+    record |= {"points": prediction.num_points, "milliseconds": round(prediction.milliseconds, 3)}
     if prediction.abstention is not None:
         record["reason"] = prediction.abstention.describe(parameter)
     values = {name: value(prediction) for name, value in OPTIONAL_FIELDS.items()}
@@ -53,6 +54,7 @@ OPTIONAL_FIELDS: dict[str, Callable[[Prediction], float | str | None]] = {
     "door_probability": lambda prediction: _rounded(prediction.door_probability, 4),
     "opening_angle_deg": lambda prediction: _rounded(prediction.opening_angle_deg, 1),
     "hinge": lambda prediction: prediction.hinge,
+    "hinge_probability": lambda prediction: _rounded(prediction.hinge_probability, 4),
     "door_x_m": lambda prediction: prediction.frame and round(prediction.frame.x_m, 3),
     "door_y_m": lambda prediction: prediction.frame and round(prediction.frame.y_m, 3),
     "door_yaw_deg": lambda prediction: prediction.frame and round(prediction.frame.yaw_deg, 1),

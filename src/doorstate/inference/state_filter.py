@@ -29,8 +29,9 @@ class StateFilter:
     """Forward filter of a hidden Markov chain with three states; docs/deployment.md has the equations.
 
     Between frames, probabilities decay towards uniform. A frame with a state multiplies them by its own probabilities
-    to a power that grows with the time since the last frame, so that the result does not depend on the frame rate; a
-    frame without a state adds nothing. Stamps may be irregular; one before the last resets the filter.
+    to a power that grows with the time since the last frame, so that the result does not depend on the frame rate. The
+    state of a rule, which has no probabilities, counts as one with probability 1: `min_likelihood` bounds it. A frame
+    without a state adds nothing. Stamps may be irregular; one before the last resets the filter.
 
     Args:
         stay_probability: probability that a door is in the same state a second later; chosen: forgets all in about 3 s
@@ -39,7 +40,7 @@ class StateFilter:
         max_weight: largest weight of one frame, however long ago the last is; chosen: with `min_likelihood`, no single
             frame can bring a new filter to `enter_probability`.
         min_likelihood: least factor of a frame for a state; chosen: above the networks' error rate on simulated doors,
-            and rules give zeros.
+            and rules give certain states.
         enter_probability: a state begins when its probability reaches this.
         leave_probability: a state ends, in None, when its probability falls below this.
 
@@ -115,7 +116,8 @@ class StateFilter:
 
     def _likelihood(self, prediction: Prediction, elapsed_s: float) -> NDArray[np.float64]:
         """Return (3,) factors by which a frame changes the belief."""
-        probabilities = np.array([prediction.probabilities[state] for state in STATES])
+        given = prediction.probabilities or {str(prediction.state): 1.0}
+        probabilities = np.array([given.get(state, 0.0) for state in STATES])
         weight = min(self._max_weight, elapsed_s / self._full_weight_s)
         bounded = (1 - len(STATES) * self._min_likelihood) * probabilities + self._min_likelihood
         likelihood: NDArray[np.float64] = bounded**weight

@@ -28,7 +28,12 @@ class PredictionResponse(BaseModel):
         description="Predicted state; null with a reason if there is none.",
         json_schema_extra={"enum": [*STATES, None]},
     )
-    probabilities: dict[str, float] = Field(description="Probability of each state.")
+    probabilities: dict[str, float] | None = Field(
+        None, description="Probability of each state; absent without a state, and for a rule."
+    )
+    raw_probabilities: dict[str, float] | None = Field(
+        None, description="Probabilities of a network whose state is refused: no evidence for a state."
+    )
     points: int = Field(description="Number of points that the prediction is based on.")
     milliseconds: float = Field(description="Time of the prediction, without reading the file.")
     reason: str = Field("", description="Reason why there is no state.")
@@ -37,6 +42,7 @@ class PredictionResponse(BaseModel):
     )
     door_probability: float | None = Field(None, description="Probability that there is a door.")
     hinge: str | None = Field(None, description="Side of the hinge, left or right, seen from the camera.")
+    hinge_probability: float | None = Field(None, description="Probability of this side.")
     door_x_m: float | None = Field(None, description="Middle of the opening, forward of the camera.")
     door_y_m: float | None = Field(None, description="Middle of the opening, to the left of the camera.")
     door_yaw_deg: float | None = Field(

@@ -119,7 +119,7 @@ def _prediction_row(sample: str, state: str, result: RuleResult) -> dict[str, st
         "sample_id": sample,
         "state": state,
         "predicted": predicted,
-        **{f"p_{name}": "1" if name == predicted else "0" for name in STATES},
+        **{f"p_{name}": "" for name in STATES},  # a rule estimates none
         "reason": result.reason,
         "opening_angle_deg": _number(result.opening_angle_deg),
         "opening_width_m": _number(result.opening_width_m),

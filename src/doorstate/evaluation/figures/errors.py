@@ -33,7 +33,8 @@ def surest_errors_figure(results: Results, dataset: PreparedDataset) -> Figure |
         axes[2 * line][0].set_ylabel(f"{method}\n{len(of_method)} errors", fontsize=10)
         for column, (_, error) in enumerate(of_method.head(_COLUMNS).iterrows()):
             words = STATE_WORDS[error["state"]], STATE_WORDS[error["predicted"]]
-            title = f"{words[0]} as {words[1]}, {error['confidence']:.2f}"
+            confidence = f", {error['confidence']:.2f}" if error["confidence"] > 0 else ""
+            title = f"{words[0]} as {words[1]}{confidence}"
             _draw(axes[2 * line][column], axes[2 * line + 1][column], dataset, error["sample_id"], title)
             detections = results.detections.get(method, {}).get(error["sample_id"], ())
             draw_detections(axes[2 * line + 1][column], detections)

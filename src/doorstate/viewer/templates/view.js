@@ -123,7 +123,7 @@
     if (entry.truth) {
       state.append(make("span", { className: isWrong(entry) ? "badge warn" : "badge" }, `truth: ${stateName(entry.truth)}`));
     }
-    element("probabilities").replaceChildren(...(prediction?.state ? data.states : []).flatMap(
+    element("probabilities").replaceChildren(...(prediction?.probabilities ? data.states : []).flatMap(
       (name) => {
         const p = prediction.probabilities?.[name];
         if (p === undefined) return [];
