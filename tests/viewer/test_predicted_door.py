@@ -23,7 +23,6 @@ def prediction(
     """Return a prediction for a wall straight ahead, three metres away."""
     return Prediction(
         DoorState.OPEN,
-        {"closed": 0.0, "semi_open": 0.0, "open": 1.0},
         num_points=1024,
         milliseconds=20.0,
         opening_angle_deg=angle_deg,
