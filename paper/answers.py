@@ -60,7 +60,7 @@ def count_answers(predictor: Predictor, examples: Iterable[Example], progress: P
     for done, (state, cloud) in enumerate(examples, 1):
         prediction = predictor(cloud)
         results.append(
-            (prediction.state is not None, prediction.state is not None and prediction.state.label == state)
+            (prediction.state is not None, prediction.state is not None and prediction.state == state)
         )
         progress(done, done)
     return AnswerCount(
