@@ -23,7 +23,7 @@ from doorstate._organized import flatten_unless_image
 from doorstate.errors import CloudContentError, CloudReadError
 from doorstate.io.pcd_header import PcdHeader, read_pcd_header
 from doorstate.io.size_limits import check_point_count, check_size
-from doorstate.io.text import parse_rows
+from doorstate.io.text_rows import parse_rows
 from doorstate.types import Points
 
 _COMPRESSED_SIZES = struct.Struct("<II")

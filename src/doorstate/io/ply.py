@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from doorstate.errors import CloudReadError
 from doorstate.io.size_limits import check_size
-from doorstate.io.text import parse_rows
+from doorstate.io.text_rows import parse_rows
 
 _HEADER = re.compile(rb"\Aply\s.*?^end_header[ \t]*(?:\r\n|\n|\r|\Z)", re.DOTALL | re.MULTILINE)
 _BYTE_ORDERS = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}
