@@ -70,10 +70,15 @@ def read_input(path: str | Path, max_bytes: int, error: type[DoorstateError] = C
         DoorstateError: of class `error`, with the path: missing, no regular file, or too large.
     """
     with open_input(path, max_bytes, error) as stream:
-        content = stream.read(max_bytes + 1)  # files of /proc have size 0, and a file may grow
-    if len(content) > max_bytes:
-        raise _too_large(path, len(content), max_bytes, error)
-    return content
+        parts = [stream.read(os.fstat(stream.fileno()).st_size + 1)]
+        size = len(parts[0])
+        # Files of /proc have size 0, and a file may grow.
+        while size <= max_bytes and (more := stream.read(_CHUNK_BYTES)):
+            parts.append(more)
+            size += len(more)
+    if size > max_bytes:
+        raise _too_large(path, size, max_bytes, error)
+    return b"".join(parts)  # the same object where there is one part
 
 
 def read_input_text(path: str | Path, max_bytes: int, error: type[DoorstateError] = CloudReadError) -> str:
@@ -88,6 +93,7 @@ def read_input_text(path: str | Path, max_bytes: int, error: type[DoorstateError
         raise error(f"is not text in UTF-8 (byte {problem.start})", path=path) from problem
 
 
+_CHUNK_BYTES = 1 << 16
 _NONBLOCK = getattr(os, "O_NONBLOCK", 0)
 
 

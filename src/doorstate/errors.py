@@ -22,6 +22,7 @@ from collections.abc import Callable, Iterable, Mapping
 from difflib import get_close_matches
 from functools import partial
 from pathlib import Path
+from textwrap import shorten
 from typing import TYPE_CHECKING, Any, Self
 
 if TYPE_CHECKING:
@@ -193,5 +194,6 @@ def first_validation_error(error: ValidationError, fields: Iterable[str] = ()) -
 
 
 def summarize_exception(error: Exception) -> str:
-    """Return the type and text of another library's exception, in one short line."""
-    return " ".join(f"{type(error).__name__}: {error}".split())[:_MAX_REASON_LENGTH]
+    """Return the type and text of another library's exception, in one line; ... stands for the end of a long one."""
+    text = f"{type(error).__name__}: {error}"[:MAX_MESSAGE_LENGTH]
+    return shorten(text, _MAX_REASON_LENGTH, placeholder=" ...")

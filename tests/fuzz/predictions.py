@@ -21,7 +21,7 @@ from doorstate.inference.network_predictor import NetworkPredictor
 from doorstate.inference.predictor import Predictor
 from doorstate.inference.rule_predictor import RulePredictor
 from doorstate.inference.serialization import prediction_to_dict
-from doorstate.io.readers import CLOUD_SUFFIXES
+from doorstate.io.formats import CLOUD_SUFFIXES
 from doorstate.rules import list_rules
 from doorstate.serving.app import create_app
 from doorstate.serving.errors import STATUS_DESCRIPTIONS

@@ -22,9 +22,10 @@ from doorstate.errors import DoorstateError
 from doorstate.io.bags import open_bag
 from doorstate.io.body_frame import points_from_depth
 from doorstate.io.camera import Pinhole, read_intrinsics
+from doorstate.io.formats import BAG_SUFFIXES, CLOUD_SUFFIXES
 from doorstate.io.messages import cloud_from_message
 from doorstate.io.options import ReadOptions
-from doorstate.io.readers import BAG_SUFFIXES, CLOUD_SUFFIXES, parse_cloud, read_cloud
+from doorstate.io.readers import parse_cloud, read_cloud
 from doorstate.types import Points
 from tests.fuzz import examples, predictions, settings_files
 from tests.fuzz.harness import Target, check_line, fuzz_target, outcome_of

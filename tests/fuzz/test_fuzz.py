@@ -13,8 +13,9 @@ pytest.importorskip("fastapi")
 import numpy as np
 
 from doorstate.io.camera import Pinhole
+from doorstate.io.formats import CLOUD_SUFFIXES
 from doorstate.io.options import ReadOptions
-from doorstate.io.readers import CLOUD_SUFFIXES, parse_cloud
+from doorstate.io.readers import parse_cloud
 from doorstate.types import Points
 from tests.fuzz import examples, harness, predictions, settings_files, targets
 from tests.hand_made_clouds import image_of_a_rough_wall

@@ -69,13 +69,25 @@ def test_an_undecided_archive_lists_its_arrays() -> None:
         POINTS.astype(bool),
         POINTS.astype(np.uint8),
         np.zeros(4, "M8[s]"),
-        np.zeros(4, [("x", "f4"), ("y", "f4"), ("z", "f4")]),
+        np.zeros(4, [("x", "f4"), ("y", "f4"), ("intensity", "f4")]),
+        np.zeros(4, [("x", "f4"), ("y", "f4"), ("z", "u1")]),
     ],
     ids=lambda array: str(array.dtype),
 )
 def test_other_kinds_of_values_are_refused(array: NDArray[Any]) -> None:
-    with pytest.raises(CloudReadError, match=r"holds .* values"):
+    with pytest.raises(CloudReadError, match=r"holds (.* values|fields x, y, .*)"):
         parse_npy(_npy(array))
+
+
+@given(npst.arrays(np.float32, npst.array_shapes(max_dims=2).map(lambda shape: (*shape, 3))), st.booleans())
+@settings(deadline=None, max_examples=30)
+def test_structured_arrays_have_fields_x_y_z(points: NDArray[np.float32], is_big_endian: bool) -> None:
+    kind = ">f4" if is_big_endian else "<f4"
+    stored = np.zeros(points.shape[:-1], [("intensity", "u1"), ("z", kind), ("x", kind), ("y", "<f8")])
+    for axis, name in enumerate("xyz"):
+        stored[name] = points[..., axis]
+    for read in (parse_npy(_npy(stored)), parse_npz(_npz(cloud=stored))):
+        np.testing.assert_array_equal(read.astype(np.float32), points)
 
 
 class _Trap:
@@ -102,5 +114,5 @@ def test_a_member_that_unpacks_to_gigabytes_is_not_unpacked() -> None:
     with zipfile.ZipFile(stream, "a") as archive:
         archive.getinfo("points.npy").file_size = 3 << 30
         archive.writestr("note.txt", "forces a new directory")
-    with pytest.raises(CloudReadError, match="unpacks to 3221225472 bytes"):
+    with pytest.raises(CloudReadError, match="3221225472 bytes"):
         parse_npz(stream.getvalue())

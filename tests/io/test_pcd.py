@@ -196,7 +196,7 @@ _COMPRESSED = HEADER.replace("ascii", "binary_compressed").encode()
         (HEADER.replace("SIZE 4 4 4", "SIZE 4 4").encode(), "differ in length"),
         (HEADER.encode() + b"1 2 3\n4 5 6\n", "3 points are declared, 2 are there"),
         (HEADER.encode() + b"1 2 3\n# 2 3\n4 5 6\n", "3 points are declared, 2 are there"),
-        (HEADER.encode() + b"1 2 3\n1 2\n4 5 6\n", "rows of numbers"),
+        (HEADER.encode() + b"1 2 3\n1 2\n4 5 6\n", "line 13 has 2 columns"),
         # pypcd4 would make 200,003 fields.
         (
             _BINARY.replace(b"x y z", b"x y z w")

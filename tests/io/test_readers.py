@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import gzip
 import os
 import tracemalloc
 import warnings
@@ -15,10 +16,11 @@ from PIL import Image
 from doorstate.errors import MAX_MESSAGE_LENGTH, CameraError, CloudReadError
 from doorstate.io.camera import Intrinsics, Pinhole
 from doorstate.io.depth import depth_to_points
+from doorstate.io.formats import CLOUD_SUFFIXES, suffix_of_content, unpack_gzip
 from doorstate.io.options import ReadOptions
 from doorstate.io.pcd import write_pcd
-from doorstate.io.readers import CLOUD_SUFFIXES, parse_cloud, read_cloud
-from doorstate.io.size_limits import MAX_POINTS
+from doorstate.io.readers import parse_cloud, read_cloud
+from doorstate.io.size_limits import MAX_FILE_BYTES, MAX_POINTS
 from tests.fuzz.examples import saved
 from tests.io.bombs import bomb
 
@@ -150,7 +152,7 @@ def test_a_narrow_png_is_still_a_depth_image(tmp_path: Path) -> None:
 def test_camera_errors_of_files_have_their_path(tmp_path: Path, valid: dict[str, bytes], name: str) -> None:
     path = tmp_path / name
     if name == "a.npy":
-        np.save(path, DEPTH_MM)
+        np.save(path, np.tile(DEPTH_MM, (5, 1)))
     else:
         path.write_bytes(valid[".png"])
     with pytest.raises(CameraError) as caught:
@@ -167,13 +169,15 @@ def test_camera_errors_of_files_have_their_path(tmp_path: Path, valid: dict[str,
         ("a.pcd", b"", "empty"),
         ("a.npy", b"\x93NUMPY\x01\x00", "damaged"),
         ("a.npz", b"PK", "damaged"),
-        ("a.xyz", b"\x89PNG\r\n", "damaged"),
+        ("a.xyz", b"\x89PNG\r\n", "has the columns"),
+        ("a.xyz", b"\0" * 5000, "null bytes"),
+        ("a.pcd", b"\x1f\x8b\x08 damaged", "gzip"),
     ],
 )
 def test_bad_files_are_read_errors(tmp_path: Path, name: str, data: bytes, reason: str) -> None:
     error = read_error(_write(tmp_path, name, data))
     assert reason in error.message
-    assert (error.hint is not None) == name.endswith(".mcap")
+    assert (error.hint is not None) == name.endswith((".mcap", ".obj"))
 
 
 def test_unprintable_characters_do_not_reach_the_terminal(tmp_path: Path) -> None:
@@ -190,6 +194,102 @@ def test_missing_files_folders_and_locked_files(tmp_path: Path) -> None:
     assert "is a folder" in read_error(tmp_path / "folder.pcd").message
     if not os.access(locked, os.R_OK):  # root may read anything
         assert "Permission denied" in read_error(locked).message
+
+
+@pytest.mark.parametrize("suffix", sorted(set(CLOUD_SUFFIXES) - {".png"}))
+def test_files_packed_by_gzip(tmp_path: Path, valid: dict[str, bytes], suffix: str) -> None:
+    packed = gzip.compress(valid[suffix])
+    np.testing.assert_array_equal(read_cloud(_write(tmp_path, f"a{suffix}.gz", packed)), POINTS)
+    np.testing.assert_array_equal(parse_cloud(packed, suffix), POINTS)
+    assert "gzip" in read_error(_write(tmp_path, f"b{suffix}.GZ", packed[:-9])).message
+
+
+def test_gzip_that_unpacks_to_too_much_is_refused_with_flat_memory(tmp_path: Path) -> None:
+    packed = gzip.compress(bytes(1 << 20)) * 257  # several members are one file
+    assert unpack_gzip(packed[: len(packed) // 257]) == bytes(1 << 20)
+    with pytest.raises(CloudReadError):
+        unpack_gzip(packed, max_bytes=(1 << 20) + 1)
+    tracemalloc.start()
+    try:
+        with pytest.raises(CloudReadError):
+            unpack_gzip(packed, max_bytes=1000)
+        peak_bytes = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak_bytes < 1e6
+
+
+@pytest.mark.parametrize("suffix", CLOUD_SUFFIXES)
+def test_a_file_larger_than_the_limit_is_refused_before_it_is_read(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"large{suffix}"
+    with path.open("wb") as stream:
+        stream.truncate(200 << 30)
+    link = tmp_path / f"zero{suffix}"
+    link.symlink_to("/dev/zero")
+    pipe = tmp_path / f"pipe{suffix}"
+    os.mkfifo(pipe)
+    tracemalloc.start()
+    try:
+        errors = [read_error(some) for some in (path, link, pipe)]
+        peak_bytes = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak_bytes < 1e6
+    assert errors[0].expected == f"at most {MAX_FILE_BYTES}"
+    with pytest.raises(CloudReadError, check=lambda error: error.expected == f"at most {MAX_FILE_BYTES}"):
+        parse_cloud(_Claims(b"1 2 3"), suffix)
+
+
+class _Claims(bytes):
+    """Bytes that claim to be too many."""
+
+    def __len__(self) -> int:
+        return MAX_FILE_BYTES + 1
+
+
+@pytest.mark.parametrize("suffix", [".las", ".LAZ", ".e57", ".obj", ".jpg", ".mcap", ".doc"])
+def test_files_of_other_formats_have_a_hint_how_to_convert_them(tmp_path: Path, suffix: str) -> None:
+    error = read_error(_write(tmp_path, f"scan{suffix}", b"anything"))
+    assert (error.hint is not None) == (suffix != ".doc")
+    assert error.expected == " ".join(CLOUD_SUFFIXES)
+    if error.hint and "python -c" in error.hint:
+        code = error.hint.partition('python -c "')[2].removesuffix('"')
+        compile(code, "hint", "exec")
+        assert suffix.lower() in code
+
+
+@pytest.mark.parametrize(
+    ("data", "suffix"),
+    [
+        (b"# .PCD v.7 - Point Cloud Data file format\nVERSION .7\nFIELDS x", ".pcd"),
+        (b"VERSION 0.7\r\n", ".pcd"),
+        (b"ply\nformat", ".ply"),
+        (b"1 2 3\n", None),
+        (b"", None),
+    ],
+)
+def test_formats_are_recognized_by_their_first_bytes(data: bytes, suffix: str | None) -> None:
+    assert suffix_of_content(data) == suffix
+
+
+def test_content_shows_every_binary_format(valid: dict[str, bytes]) -> None:
+    for suffix, data in valid.items():
+        assert suffix_of_content(data) == (None if suffix in (".xyz", ".txt", ".csv") else suffix)
+
+
+def test_coordinates_as_rows_and_single_axes(tmp_path: Path) -> None:
+    points = np.random.default_rng(0).normal(size=(50, 3)).astype(np.float32)
+    np.save(tmp_path / "a.npy", points.T)
+    np.testing.assert_array_equal(read_cloud(tmp_path / "a.npy"), points)
+    np.save(tmp_path / "four.npy", np.vstack([points.T, np.ones(50, np.float32)]))
+    assert read_error(tmp_path / "four.npy").suggestions == {"intrinsics": None}
+    np.save(tmp_path / "channels.npy", np.zeros((3, 40, 50), np.float32))
+    assert read_error(tmp_path / "channels.npy").hint is not None
+    expected = depth_to_points(np.full((4, 20), 1.25), CAMERA)
+    for shape in ((1, 4, 20), (4, 20, 1)):
+        np.save(tmp_path / "depth.npy", np.full(shape, 1.25, np.float32))
+        points = read_cloud(tmp_path / "depth.npy", ReadOptions(intrinsics=CAMERA))
+        np.testing.assert_array_equal(points, expected)
 
 
 @pytest.mark.parametrize("shape", [(), (5,), (5, 2), (0, 0), (2, 2, 2), (2, 2, 2, 3), (2, 2, 40)])

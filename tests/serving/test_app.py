@@ -20,8 +20,8 @@ from PIL import Image
 
 import doorstate
 from doorstate.inference.abstention import Abstention
+from doorstate.io.formats import CLOUD_SUFFIXES
 from doorstate.io.pcd import write_pcd
-from doorstate.io.readers import CLOUD_SUFFIXES
 from doorstate.networks.weights import save_weights
 from doorstate.serving.models import PredictionResponse
 from doorstate.serving.request import PredictQuery

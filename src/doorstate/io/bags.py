@@ -24,6 +24,7 @@ from doorstate.io.bag_limits import (
 )
 from doorstate.io.camera import Intrinsics
 from doorstate.io.depth_messages import check_compressed_format, check_encoding
+from doorstate.io.formats import BAG_SUFFIXES
 from doorstate.io.messages import (
     CAMERA_INFO,
     CLOUD,
@@ -34,7 +35,6 @@ from doorstate.io.messages import (
     stamp_ns_of,
 )
 from doorstate.io.options import DEFAULT_OPTIONS, ReadOptions
-from doorstate.io.readers import BAG_SUFFIXES
 from doorstate.io.sensor_pose import PosedCloud, SensorPose
 from doorstate.types import Points
 

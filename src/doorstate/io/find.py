@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from doorstate.errors import CloudReadError
-from doorstate.io.readers import BAG_SUFFIXES, CLOUD_SUFFIXES, OPEN_BAG_HINT
+from doorstate.io.formats import BAG_SUFFIXES, CLOUD_SUFFIXES, OPEN_BAG_HINT, format_suffix
 
 _PREPARED = "dataset.json"  # dataset.store
 _TABLES = ("index.csv", "manifest.csv", "predictions.csv", "rejected.csv")
@@ -56,7 +56,7 @@ def _clouds_of(folder: Path) -> list[Path]:
 def _is_cloud(path: Path) -> bool:
     hidden = any(part.startswith(".") for part in path.parts)
     skipped = path.name in _TABLES or path.name.lower().endswith("_rgb.png")
-    return path.suffix.lower() in CLOUD_SUFFIXES and not hidden and not skipped
+    return format_suffix(path) in CLOUD_SUFFIXES and not hidden and not skipped
 
 
 def _natural_order(path: Path) -> tuple[list[str | int], str]:

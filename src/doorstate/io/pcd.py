@@ -47,21 +47,23 @@ def parse_pcd(data: bytes) -> NDArray[Any]:
     check_point_count(header.points)
     if header.points == 0:
         return np.empty((0, 3), dtype=np.float32)
-    points = _parse_points(header, data[header.body :])
+    points = _parse_points(header, data)
     if min(header.height, header.width) > 1 and header.height * header.width == header.points:
         return flatten_unless_image(points.reshape(header.height, header.width, 3))
     return points
 
 
-def _parse_points(header: PcdHeader, body: bytes) -> NDArray[Any]:
+def _parse_points(header: PcdHeader, data: bytes) -> NDArray[Any]:
     places = [next(i for i, field in enumerate(header.fields) if field.name == axis) for axis in "xyz"]
-    values = sum(field.count for field in header.fields)
+    values = sum(field.values for field in header.fields)
+    body = data[header.body :]
     if header.encoding == "ascii":
-        columns = [sum(field.count for field in header.fields[:place]) for place in places]
-        return parse_rows(body, columns, header.points)
+        columns = [sum(field.values for field in header.fields[:place]) for place in places]
+        lines = len(data[: header.body].splitlines())
+        return parse_rows(body, columns, header.points, first_line=lines + 1)
     if values > _MAX_POINT_VALUES:
         raise CloudReadError(f"has {values} values per point", expected=f"at most {_MAX_POINT_VALUES}")
-    declared = header.points * sum(field.size * field.count for field in header.fields)
+    declared = header.points * sum(field.size * field.values for field in header.fields)
     if header.encoding == "binary":
         check_size(declared, len(body), "bytes")
     else:
@@ -70,17 +72,20 @@ def _parse_points(header: PcdHeader, body: bytes) -> NDArray[Any]:
         check_size(compressed, len(body) - _COMPRESSED_SIZES.size, "bytes")
         if unpacked != declared or unpacked > _MAX_EXPANSION * compressed:
             raise CloudReadError(f"is damaged: {declared} bytes are declared, {unpacked} are packed")
-    metadata = MetaData(
-        # pypcd4 needs unique names: fields other than x, y, z (padding, repeated names) are named by their place.
-        fields=tuple(
-            field.name if place in places else f"field_{place}" for place, field in enumerate(header.fields)
-        ),
-        size=tuple(field.size for field in header.fields),
-        type=tuple(field.kind for field in header.fields),
-        count=tuple(field.count for field in header.fields),
-        points=header.points,
-        width=header.points,
-        data=Encoding(header.encoding),
+    metadata = MetaData.model_validate(
+        {
+            # pypcd4 needs unique names: fields other than x, y, z (padding, repeated names) are named by their place.
+            "fields": [
+                field.name if place in places else f"field_{place}"
+                for place, field in enumerate(header.fields)
+            ],
+            "size": [field.size for field in header.fields],
+            "type": [field.kind for field in header.fields],
+            "count": [field.values for field in header.fields],
+            "points": header.points,
+            "width": header.points,
+            "data": header.encoding,
+        }
     )
     stream = io.BytesIO(metadata.compose_header().encode() + body)
     return PointCloud.from_fileobj(io.BufferedReader(stream)).numpy(("x", "y", "z"))

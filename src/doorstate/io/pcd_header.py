@@ -23,12 +23,12 @@ _TYPES = {"F": (4, 8), "U": (1, 2, 4, 8), "I": (1, 2, 4, 8)}
 
 
 class PcdField(NamedTuple):
-    """Field of every point: `count` values of `size` bytes; `kind` is F, U or I."""
+    """Field of every point: `values` of `size` bytes; `kind` is F, U or I."""
 
     name: str
     size: int
     kind: str
-    count: int
+    values: int
 
 
 class PcdHeader(NamedTuple):
@@ -92,9 +92,9 @@ def _fields(entries: dict[str, list[str]]) -> tuple[PcdField, ...]:
             )
     for axis in "xyz":
         first = next(field for field in fields if field.name == axis)
-        if first.count != 1:
-            raise CloudReadError(f"has {first.count} values a point", field=axis, expected="one")
-    return tuple(field for field in fields if field.count > 0)
+        if first.values != 1:
+            raise CloudReadError(f"has {first.values} values a point", field=axis, expected="one")
+    return tuple(field for field in fields if field.values > 0)
 
 
 def _whole_numbers(entries: dict[str, list[str]], name: str, default: list[str]) -> list[int]:

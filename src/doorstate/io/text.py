@@ -37,7 +37,7 @@ class _Head(NamedTuple):
 
     header: str  # "" if there is none
     is_comment: bool
-    count: int | None  # number of points in a line of its own
+    declared: int | None  # number of points in a line of its own
     first_line: int
     first_row: str
 
@@ -62,10 +62,10 @@ def parse_table(data: bytes) -> NDArray[np.float64]:
     delimiter = _delimiter(head.first_row)
     columns = _columns(head, split_cells(head.first_row, delimiter), delimiter)
     points = load_columns(table_rows(data, head.first_line), columns, delimiter)
-    if head.count is not None:
-        check_size(head.count, len(points), "points")
-        if head.count < len(points):
-            raise CloudReadError(f"declares {head.count} points, and holds {len(points)}")
+    if head.declared is not None:
+        check_size(head.declared, len(points), "points")
+        if head.declared < len(points):
+            raise CloudReadError(f"declares {head.declared} points, and holds {len(points)}")
     return points
 
 

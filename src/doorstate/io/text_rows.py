@@ -73,7 +73,14 @@ def is_number(cell: str) -> bool:
     return True
 
 
-def parse_rows(body: bytes, columns: Sequence[int], count: int, skip: int = 0) -> NDArray[np.float64]:
+def parse_rows(
+    body: bytes,
+    columns: Sequence[int],
+    count: int,
+    skip: int = 0,
+    first_line: int = 1,
+    change: Callable[[str], str] | None = None,
+) -> NDArray[np.float64]:
     """Read three columns of the blank-separated rows that follow the header of an ASCII PCD or PLY file.
 
     Args:
@@ -81,6 +88,8 @@ def parse_rows(body: bytes, columns: Sequence[int], count: int, skip: int = 0) -
         columns: places of x, y, z in a row.
         count: rows the header declares.
         skip: rows to leave out before them.
+        first_line: number of the first line of the body in its file.
+        change: changes a row before its columns are read.
 
     Returns:
         (count, 3) in file order and units.
@@ -91,7 +100,8 @@ def parse_rows(body: bytes, columns: Sequence[int], count: int, skip: int = 0) -
     check_point_count(count)
 
     def rows() -> Iterator[tuple[int, str]]:
-        return islice(_rows_of(text_lines(body)), skip, skip + count)
+        chosen = islice(_rows_of(text_lines(body)), skip, skip + count)
+        return ((first_line - 1 + number, change(row) if change else row) for number, row in chosen)
 
     points = load_columns(rows, columns, None)
     check_size(count, len(points), "points")
@@ -157,13 +167,18 @@ def _load(
 
 def _number(cell: str) -> float:
     text = cell.strip()
-    if not text or _NAN.fullmatch(text):
-        return np.nan
-    if infinite := _INFINITY.fullmatch(text):
-        return float(f"{infinite[1]}inf")
     if "_" in text or not text.isascii():  # Python's own spellings
         raise ValueError(text)
-    return float(text.replace(",", ".") if text.count(",") == 1 else text)
+    try:
+        return float(text)
+    except ValueError:
+        if not text or _NAN.fullmatch(text):
+            return np.nan
+        if infinite := _INFINITY.fullmatch(text):
+            return float(f"{infinite[1]}inf")
+        if text.count(",") == 1:
+            return float(text.replace(",", "."))
+        raise
 
 
 def _explain(

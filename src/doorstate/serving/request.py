@@ -9,8 +9,8 @@ from fastapi import HTTPException
 from pydantic import BaseModel, ConfigDict, Field
 
 from doorstate.io.camera import pinhole_from_numbers
+from doorstate.io.formats import CLOUD_SUFFIXES
 from doorstate.io.options import ReadOptions, metres_per_unit, unit_name
-from doorstate.io.readers import CLOUD_SUFFIXES
 from doorstate.io.rotations import parse_quaternion
 from doorstate.types import UNITS_M
 
