@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -39,6 +39,14 @@ if os.environ.get("CI"):
 def _one_thread() -> None:
     """Small tensors are quicker on one thread, and the suite runs one process per processor."""
     torch.set_num_threads(1)
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _no_waiting_for_the_disk() -> Iterator[None]:
+    """A test that loses its files to a power cut is run again, and waiting would make the suite twice as long."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("doorstate._files._sync", lambda *_: None)
+        yield
 
 
 @pytest.fixture(scope="session")

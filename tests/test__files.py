@@ -5,6 +5,9 @@ from __future__ import annotations
 
 import errno
 import os
+import subprocess
+import sys
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -48,6 +51,53 @@ def test_a_block_that_writes_nothing_is_an_error_and_keeps_the_old_file(tmp_path
     assert target.read_text(encoding="utf-8") == "old"
 
 
+def test_a_file_is_on_the_disk_before_it_has_its_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    target, steps = tmp_path / "a.txt", list[tuple[Path, bool]]()
+    monkeypatch.setattr(
+        "doorstate._files._sync", lambda path, flags=os.O_RDWR: steps.append((path, target.exists()))
+    )
+    write_text(target, "text", durable=False)
+    assert steps == []
+    target.unlink()
+    write_text(target, "text")
+    (temporary, before), (folder, after) = steps
+    assert (temporary.parent, before, folder, after) == (tmp_path, False, tmp_path, True)
+
+
+def test_real_files_and_folders_can_be_synced(tmp_path: Path) -> None:
+    code = f"from doorstate._files import write_text; from pathlib import Path; write_text(Path({str(tmp_path)!r}) / 'a', 'b')"
+    subprocess.run([sys.executable, "-c", code], check=True)
+    assert (tmp_path / "a").read_text() == "b"
+
+
+def test_threads_never_show_a_torn_file(tmp_path: Path) -> None:
+    target, texts, torn = tmp_path / "a.txt", ["a" * 300_000, "b" * 200_000], list[int]()
+    write_text(target, texts[0])
+    stop = threading.Event()
+
+    def read() -> None:
+        while not stop.is_set():
+            if (text := target.read_text(encoding="utf-8")) not in texts:
+                torn.append(len(text))
+
+    def write(text: str) -> None:
+        for _ in range(100):
+            write_text(target, text)
+
+    reader = threading.Thread(target=read)
+    writers = [threading.Thread(target=write, args=(text,)) for text in texts]
+    for thread in (reader, *writers):
+        thread.start()
+    for thread in writers:
+        thread.join()
+    stop.set()
+    reader.join()
+    assert torn == []
+    assert list(tmp_path.iterdir()) == [target]
+
+
 def test_unwritable_targets_are_output_errors(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     for target in (tmp_path / "file" / "page.html", tmp_path):
@@ -77,8 +127,12 @@ def test_text_is_utf_8_in_every_locale(tmp_path: Path) -> None:
 
 def test_folders_with_only_temporary_files_are_vacant(tmp_path: Path) -> None:
     assert is_vacant(tmp_path / "new")
-    (tmp_path / ".123.tmp.manifest.csv").touch()
+    for name in (".123.tmp.manifest.csv", ".00ff00ff00ff00ff.tmp.a", ".doorstate.lock", ".doorstate-2-of-8.owner"):
+        (tmp_path / name).touch()
     assert is_vacant(tmp_path)
+    (tmp_path / "my.tmp.txt").touch()
+    assert not is_vacant(tmp_path)
+    (tmp_path / "my.tmp.txt").unlink()
     (tmp_path / "notes.txt").touch()
     assert not is_vacant(tmp_path)
     assert not is_vacant(tmp_path / "notes.txt")

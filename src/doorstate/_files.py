@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Atomic writing of files (write beside the target, then rename), and tables of text as CSV."""
+"""Atomic writing of files (write beside the target, then rename), and tables of text as CSV.
+
+A file under its final name is whole, whatever is killed and whoever else writes it: temporary names are random, because
+process numbers repeat between containers and threads share one, and the bytes are on the disk before the rename.
+"""
 
 from __future__ import annotations
 
@@ -7,18 +11,28 @@ import csv
 import gzip
 import io
 import os
+import re
+import secrets
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TextIO
 
 from doorstate.errors import DatasetError, OutputError
 
 
+LOCK_PREFIX = ".doorstate"  # of the files that `_locks` keeps in a folder
+_SCRATCH = re.compile(rf"\.[0-9a-f]+\.tmp\..+|{re.escape(LOCK_PREFIX)}.*\.(lock|owner)")
+
+
 @contextmanager
-def atomic_path(target: Path) -> Iterator[Path]:
+def atomic_path(target: Path, durable: bool = True) -> Iterator[Path]:
     """Yield a temporary path beside `target`, which replaces the target if the block ends without an error.
+
+    Args:
+        target: file to write.
+        durable: wait until the file and its name are on the disk; without it, a power cut may lose the file.
 
     Raises:
         OutputError: the target cannot be written.
@@ -26,10 +40,14 @@ def atomic_path(target: Path) -> Iterator[Path]:
     check_writable(target)
     target.parent.mkdir(parents=True, exist_ok=True)
     # The suffix stays the same, because numpy and matplotlib choose the format by it.
-    temporary = target.with_name(f".{os.getpid()}.tmp.{target.name}")
+    temporary = target.with_name(f".{secrets.token_hex(8)}.tmp.{target.name}")
     try:
         yield temporary
+        if durable:
+            _sync(temporary)
         temporary.replace(target)
+        if durable:
+            _sync_folder(target.parent)
     except OSError as error:
         is_other_file = error.filename is not None and str(error.filename) != str(temporary)
         if is_other_file or isinstance(error, FileNotFoundError):
@@ -37,6 +55,19 @@ def atomic_path(target: Path) -> Iterator[Path]:
         raise OutputError(f"cannot be written ({error.strerror or error})", path=target) from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def _sync(path: Path, flags: int = os.O_RDWR) -> None:
+    descriptor = os.open(path, flags)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _sync_folder(folder: Path) -> None:
+    with suppress(OSError):  # Windows opens no folders, and some network file systems do not sync them
+        _sync(folder, os.O_RDONLY)
 
 
 def check_writable(target: Path) -> None:
@@ -57,14 +88,19 @@ def check_writable(target: Path) -> None:
     raise OutputError(f"cannot be written ({reason})", path=target)
 
 
+def is_scratch(path: Path) -> bool:
+    """Return True for temporary files of interrupted writes, and files of locks."""
+    return _SCRATCH.fullmatch(path.name) is not None
+
+
 def is_vacant(folder: Path) -> bool:
-    """Return True if a folder does not exist, or holds nothing but temporary files of interrupted writes."""
-    return not folder.exists() or (folder.is_dir() and all(".tmp." in path.name for path in folder.iterdir()))
+    """Return True if a folder does not exist, or holds nothing but temporary files and locks."""
+    return not folder.exists() or (folder.is_dir() and all(map(is_scratch, folder.iterdir())))
 
 
-def write_text(target: Path, text: str) -> None:
-    """Write `text` as UTF-8, atomically."""
-    with atomic_path(target) as temporary:
+def write_text(target: Path, text: str, durable: bool = True) -> None:
+    """Write `text` as UTF-8, atomically; `durable` as in `atomic_path`."""
+    with atomic_path(target, durable) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
 

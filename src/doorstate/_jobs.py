@@ -41,6 +41,11 @@ class Shard(NamedTuple):
             raise ConfigError(f"{text!r} is not a shard", field="shard", expected="number/count, such as 2/8")
         return shard
 
+    @property
+    def name(self) -> str:
+        """Name for files, such as `2-of-8`."""
+        return f"{self.number}-of-{self.shards}"
+
     def select(self, pieces: Sequence[Piece]) -> Sequence[Piece]:
         """Return every `shards`-th piece, so that all shards take about as long."""
         return pieces[self.number - 1 :: self.shards]

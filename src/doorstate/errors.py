@@ -13,6 +13,7 @@ DoorstateError
 ├── WeightsError           a weights file is missing, damaged, or made for another network
 ├── ExportError            a network cannot be exported, or the exported file disagrees with it
 ├── OutputError            a file cannot be written
+│   └── FolderInUseError   another process writes the folder
 └── MissingExtraError      an optional package is needed and not installed
 """
 
@@ -149,6 +150,10 @@ class ExportError(DoorstateError):
 
 class OutputError(DoorstateError):
     """A file cannot be written."""
+
+
+class FolderInUseError(OutputError):
+    """Another process or thread works in an output folder."""
 
 
 class MissingExtraError(DoorstateError):

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from doorstate import __version__
-from doorstate._files import is_vacant, write_csv
+from doorstate._files import is_scratch, is_vacant, write_csv
 from doorstate.dataset.pieces import write_concatenated
 from doorstate.dataset.store import (
     CLOUDS_FILE,
@@ -85,5 +85,5 @@ def check_same_sampling(dataset: PreparedDataset, reference: PreparedDataset) ->
 
 def _is_unfinished(folder: Path) -> bool:
     """Return True for the files of a join that was killed before it wrote its description."""
-    names = {path.name for path in folder.iterdir() if ".tmp." not in path.name} if folder.is_dir() else set()
+    names = {path.name for path in folder.iterdir() if not is_scratch(path)} if folder.is_dir() else set()
     return CLOUDS_FILE in names and names <= {CLOUDS_FILE, PARTS_FILE, MANIFEST_FILE}

@@ -86,11 +86,9 @@ def write_concatenated(
         shape: shape of all of them together.
         dtype: number type of the file.
     """
-    with atomic_path(target) as temporary:
-        joined = np.lib.format.open_memmap(temporary, mode="w+", dtype=dtype, shape=shape)
-        start = 0
+    header = {"descr": np.lib.format.dtype_to_descr(np.dtype(dtype)), "fortran_order": False, "shape": shape}
+    # No memory map: on a full disk, writing to one ends the process with SIGBUS.
+    with atomic_path(target) as temporary, temporary.open("wb") as stream:
+        np.lib.format.write_array_header_1_0(stream, header)
         for array in arrays:
-            joined[start : start + len(array)] = array
-            start += len(array)
-        joined.flush()
-        del joined
+            stream.write(np.ascontiguousarray(array, dtype=dtype).data)

@@ -11,6 +11,7 @@ from typing import NamedTuple
 from doorstate import __version__
 from doorstate._files import is_vacant, read_csv, write_csv
 from doorstate._jobs import Progress, Shard, default_workers, no_progress, piece_paths, run_pieces
+from doorstate._locks import owned_folder
 from doorstate.dataset.layouts import find_layout
 from doorstate.dataset.pieces import PieceClouds, SavedPieces
 from doorstate.dataset.preparation import CLAIM, Preparation
@@ -62,15 +63,17 @@ def prepare_dataset(
     Raises:
         ConfigError: `folder` holds something else.
         DatasetError: the source is empty, or none of its clouds could be prepared.
+        FolderInUseError: another process works in `folder`.
     """
-    pieces, paths = _claim(preparation, folder)
-    if (folder / DESCRIPTION_FILE).exists():
-        shutil.rmtree(folder / _PIECES, ignore_errors=True)
-        progress(1, 1)
-        rejected = read_csv(folder / REJECTED) if (folder / REJECTED).exists() else []
-        return PreparationSummary(open_dataset(folder), rejected)
-    run_pieces(_prepare_piece, pieces, paths, workers or default_workers(), progress)
-    return assemble([row for piece in pieces for row in piece.rows], preparation, folder, paths)
+    with owned_folder(folder):
+        pieces, paths = _claim(preparation, folder)
+        if (folder / DESCRIPTION_FILE).exists():
+            shutil.rmtree(folder / _PIECES, ignore_errors=True)
+            progress(1, 1)
+            rejected = read_csv(folder / REJECTED) if (folder / REJECTED).exists() else []
+            return PreparationSummary(open_dataset(folder), rejected)
+        run_pieces(_prepare_piece, pieces, paths, workers or default_workers(), progress)
+        return assemble([row for piece in pieces for row in piece.rows], preparation, folder, paths)
 
 
 def prepare_shard(
@@ -85,14 +88,16 @@ def prepare_shard(
     Raises:
         ConfigError: `folder` holds something else.
         DatasetError: the source is empty.
+        FolderInUseError: another process works in `folder`, or on this shard of it.
     """
-    pieces, paths = _claim(preparation, folder)
-    if (folder / DESCRIPTION_FILE).exists():
-        progress(1, 1)
-        return
-    run_pieces(
-        _prepare_piece, shard.select(pieces), shard.select(paths), workers or default_workers(), progress
-    )
+    with owned_folder(folder, shard.name):
+        pieces, paths = _claim(preparation, folder)
+        if (folder / DESCRIPTION_FILE).exists():
+            progress(1, 1)
+            return
+        run_pieces(
+            _prepare_piece, shard.select(pieces), shard.select(paths), workers or default_workers(), progress
+        )
 
 
 def assemble(

@@ -19,6 +19,7 @@ from pydantic import ValidationError
 
 from doorstate._files import atomic_path, is_vacant, read_csv, write_csv, write_text
 from doorstate._jobs import Progress, Shard, default_workers, no_progress, piece_paths, run_pieces
+from doorstate._locks import owned_folder
 from doorstate.errors import ConfigError, DatasetError, first_validation_error
 from doorstate.io.pcd import write_pcd
 from doorstate.simulation.frames import Frame
@@ -63,18 +64,20 @@ def simulate_dataset(
 
     Raises:
         ConfigError: the folder holds something else.
+        FolderInUseError: another process works in it.
     """
-    pieces, paths = _claim(folder, settings, callback)
-    manifest, scratch = folder / MANIFEST_FILE, folder / _PIECES
-    if manifest.exists():
-        shutil.rmtree(scratch, ignore_errors=True)
-        progress(1, 1)
-        return read_csv(manifest)
-    run_pieces(_simulate_piece, pieces, paths, workers or default_workers(), progress)
-    rows = [row for path in paths for row in read_csv(path)]
-    write_csv(manifest, rows)
-    shutil.rmtree(scratch)
-    return rows
+    with owned_folder(folder):
+        pieces, paths = _claim(folder, settings, callback)
+        manifest, scratch = folder / MANIFEST_FILE, folder / _PIECES
+        if manifest.exists():
+            shutil.rmtree(scratch, ignore_errors=True)
+            progress(1, 1)
+            return read_csv(manifest)
+        run_pieces(_simulate_piece, pieces, paths, workers or default_workers(), progress)
+        rows = [row for path in paths for row in read_csv(path)]
+        write_csv(manifest, rows)
+        shutil.rmtree(scratch)
+        return rows
 
 
 def simulate_shard(
@@ -92,14 +95,16 @@ def simulate_shard(
 
     Raises:
         ConfigError: the folder holds something else.
+        FolderInUseError: another process works in it.
     """
-    pieces, paths = _claim(folder, settings, callback)
-    if (folder / MANIFEST_FILE).exists():
-        progress(1, 1)
-        return
-    run_pieces(
-        _simulate_piece, shard.select(pieces), shard.select(paths), workers or default_workers(), progress
-    )
+    with owned_folder(folder, shard.name):
+        pieces, paths = _claim(folder, settings, callback)
+        if (folder / MANIFEST_FILE).exists():
+            progress(1, 1)
+            return
+        run_pieces(
+            _simulate_piece, shard.select(pieces), shard.select(paths), workers or default_workers(), progress
+        )
 
 
 def read_settings(folder: Path) -> SimulationSettings:

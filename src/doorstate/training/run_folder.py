@@ -55,7 +55,7 @@ class RunFolder:
 
     def write_position(self, epochs: float) -> None:
         """Write the position of the training, in epochs, for progress displays."""
-        write_text(self.position, f"{epochs:.3f}\n")
+        write_text(self.position, f"{epochs:.3f}\n", durable=False)
 
     def read_position(self) -> float:
         """Return the position of the training, in epochs; 0 before it is written."""
