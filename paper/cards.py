@@ -9,12 +9,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from doorstate._documents import read_json
 from doorstate.clouds.augmentation import Augmentation
 from doorstate.evaluation.heads import head_errors, head_rows, score_four_labels
 from doorstate.evaluation.method_scores import MACRO, score_states
 from doorstate.evaluation.results import Results
 from doorstate.networks.card import WeightsCard
-from doorstate.training.run_folder import RunFolder, read_json
+from doorstate.training.run_folder import RunFolder
 from doorstate.types import STATES
 
 from .paths import TITLES

@@ -3,11 +3,12 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
+
+from doorstate._documents import read_toml
 
 from . import paths
 
@@ -51,7 +52,7 @@ def read_definition(name: str) -> Definition:
         FileNotFoundError: there is no such file.
     """
     path = paths.EXPERIMENTS / f"{name}.toml"
-    return Definition(name, tomllib.loads(path.read_text(encoding="utf-8")))
+    return Definition(name, read_toml(path))
 
 
 def read_definitions() -> Iterator[Definition]:

@@ -67,8 +67,8 @@ def test_a_file_is_on_the_disk_before_it_has_its_name(
 
 
 def test_real_files_and_folders_can_be_synced(tmp_path: Path) -> None:
-    code = f"from doorstate._files import write_text; from pathlib import Path; write_text(Path({str(tmp_path)!r}) / 'a', 'b')"
-    subprocess.run([sys.executable, "-c", code], check=True)
+    code = "import sys, pathlib, doorstate._files as files; files.write_text(pathlib.Path(sys.argv[1]), 'b')"
+    subprocess.run([sys.executable, "-c", code, tmp_path / "a"], check=True)
     assert (tmp_path / "a").read_text() == "b"
 
 
@@ -127,7 +127,12 @@ def test_text_is_utf_8_in_every_locale(tmp_path: Path) -> None:
 
 def test_folders_with_only_temporary_files_are_vacant(tmp_path: Path) -> None:
     assert is_vacant(tmp_path / "new")
-    for name in (".123.tmp.manifest.csv", ".00ff00ff00ff00ff.tmp.a", ".doorstate.lock", ".doorstate-2-of-8.owner"):
+    for name in (
+        ".123.tmp.manifest.csv",
+        ".00ff00ff00ff00ff.tmp.a",
+        ".doorstate.lock",
+        ".doorstate-2-of-8.owner",
+    ):
         (tmp_path / name).touch()
     assert is_vacant(tmp_path)
     (tmp_path / "my.tmp.txt").touch()

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from doorstate._documents import read_json
 from doorstate.evaluation.frame_scores import score_frames
 from doorstate.evaluation.results import PROBABILITY_COLUMNS
 from doorstate.evaluation.table import (
@@ -20,7 +21,6 @@ from doorstate.evaluation.table import (
     number_column,
 )
 from doorstate.pages.colors import STATE_WORDS
-from doorstate.training.run_folder import read_json
 from doorstate.types import ABSTAINED, STATES
 
 from ..paths import RESULTS

@@ -17,10 +17,9 @@ import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TextIO
 
+from doorstate._input import MAX_TABLE_BYTES, open_input
 from doorstate.errors import DatasetError, OutputError
-
 
 LOCK_PREFIX = ".doorstate"  # of the files that `_locks` keeps in a folder
 _SCRATCH = re.compile(rf"\.[0-9a-f]+\.tmp\..+|{re.escape(LOCK_PREFIX)}.*\.(lock|owner)")
@@ -133,12 +132,10 @@ def read_csv(path: Path) -> list[dict[str, str]]:
     """Read a CSV with a header line; decompress it if the name ends in `.gz`.
 
     Raises:
-        DatasetError: the file is missing, is not text, or a line has another number of columns than the header.
+        DatasetError: the file is missing, too large or no text, or a line has more or fewer columns than the header.
     """
     try:
-        with _open_text(path) as stream:
-            reader = csv.DictReader(stream, strict=True)
-            rows = list(reader)
+        rows = list(csv.DictReader(io.StringIO(_read_text(path), newline=""), strict=True))
     except (OSError, EOFError, zlib.error, UnicodeDecodeError, csv.Error) as error:
         raise DatasetError(f"cannot be read as CSV ({error})", path=path) from error
     for number, row in enumerate(rows, start=2):
@@ -147,7 +144,11 @@ def read_csv(path: Path) -> list[dict[str, str]]:
     return rows
 
 
-def _open_text(path: Path) -> TextIO:
-    if path.suffix == ".gz":
-        return gzip.open(path, "rt", encoding="utf-8-sig", newline="")
-    return path.open(encoding="utf-8-sig", newline="")
+def _read_text(path: Path) -> str:
+    """Read a text file of a limited size, which also limits what a compressed one unpacks to."""
+    with open_input(path, MAX_TABLE_BYTES, DatasetError) as stream:
+        unpacked = gzip.GzipFile(fileobj=stream) if path.suffix == ".gz" else stream
+        content = unpacked.read(MAX_TABLE_BYTES + 1)
+    if len(content) > MAX_TABLE_BYTES:
+        raise DatasetError("is too large", path=path, expected=f"at most {MAX_TABLE_BYTES} bytes of text")
+    return content.decode("utf-8-sig")

@@ -64,7 +64,7 @@ def replace(path: Path, old: str, new: str) -> None:
         (lambda folder: (folder / DESCRIPTION_FILE).unlink(), "", None),
         (lambda folder: truncate(folder / DESCRIPTION_FILE, 30), DESCRIPTION_FILE, None),
         (lambda folder: replace(folder / DESCRIPTION_FILE, "imported", "guessed"), DESCRIPTION_FILE, None),
-        (lambda folder: (folder / DESCRIPTION_FILE).write_bytes(b"\xff\xff"), "", None),
+        (lambda folder: (folder / DESCRIPTION_FILE).write_bytes(b"\xff\xff"), DESCRIPTION_FILE, None),
         (lambda folder: (folder / CLOUDS_FILE).unlink(), "", None),
         (lambda folder: truncate(folder / CLOUDS_FILE, 0), "", None),
         (lambda folder: truncate(folder / CLOUDS_FILE, 60), "", None),

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from doorstate._documents import read_json
 from doorstate._files import read_csv, write_csv
 from doorstate.dataset.join import join_datasets
 from doorstate.dataset.splits import draw_splits, read_splits, write_splits
@@ -16,7 +17,6 @@ from doorstate.errors import ConfigError, RunError
 from doorstate.simulation.manifest import MANIFEST_FILE
 from doorstate.training.comparison import compare, prepare_comparison
 from doorstate.training.experiment import Experiment
-from doorstate.training.run_folder import read_json
 from doorstate.training.study import load_study
 from doorstate.training.transfer import TransferStudy
 

@@ -3,12 +3,12 @@
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
+from doorstate._documents import parse_toml
 from doorstate.cli.choices import HEAD, LAYOUT, NETWORK, PACKAGED, PROTOCOL, RECIPE, RULE
 from doorstate.errors import ConfigError
 
@@ -156,6 +156,8 @@ def recipe_changes(settings: list[str] | None, epochs: int | None) -> dict[str, 
         if not equals:
             raise ConfigError(f"--set {setting}: expected FIELD=VALUE")
         try:
+            changes[name.strip()] = parse_toml(f"value = {value}")["value"]
+        except ConfigError:
             changes[name.strip()] = tomllib.loads(f"value = {value}")["value"]
         except (tomllib.TOMLDecodeError, ValueError, RecursionError):
             changes[name.strip()] = value.strip()

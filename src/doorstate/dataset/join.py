@@ -11,6 +11,7 @@ import numpy as np
 
 from doorstate import __version__
 from doorstate._files import is_scratch, is_vacant, write_csv
+from doorstate._locks import owned_folder
 from doorstate.dataset.pieces import write_concatenated
 from doorstate.dataset.store import (
     CLOUDS_FILE,
@@ -33,7 +34,13 @@ def join_datasets(sources: Sequence[Path], folder: Path) -> PreparedDataset:
     Raises:
         ConfigError: the folder is not empty, or the clouds differ in size or sampling.
         DatasetError: a data set cannot be opened, or two have a sample of the same name.
+        FolderInUseError: another process works in the folder.
     """
+    with owned_folder(folder):
+        return _join(sources, folder)
+
+
+def _join(sources: Sequence[Path], folder: Path) -> PreparedDataset:
     if not (is_vacant(folder) or _is_unfinished(folder)):
         raise ConfigError("exists and is not empty", path=folder, hint="choose another folder")
     datasets = [open_dataset(source) for source in sources]

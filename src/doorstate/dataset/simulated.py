@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from doorstate._jobs import Progress, no_progress
+from doorstate._locks import owned_folder
 from doorstate.dataset.pieces import PieceClouds
 from doorstate.dataset.preparation import Preparation
 from doorstate.dataset.prepare import PreparationSummary, assemble, prepare_dataset
@@ -69,15 +70,17 @@ def simulate_prepared(
     Raises:
         ConfigError: a folder holds something else.
         DatasetError: none of the clouds could be prepared.
+        FolderInUseError: another process works in a folder.
     """
     sampler = Sampler(preparation)
-    simulate_dataset(preparation.source, settings, workers, progress, sampler)
-    paths = [sampler.path(piece) for piece in piece_names(settings)]
-    if is_prepared(folder) or not all(path.is_file() for path in paths):
-        summary = prepare_dataset(preparation, folder, workers, progress)
-    else:
-        rows = preparation.rows()
-        preparation.claim(folder, rows)
-        summary = assemble(rows, preparation, folder, paths)
-    shutil.rmtree(sampler.scratch, ignore_errors=True)
-    return summary
+    with owned_folder(preparation.source), owned_folder(folder):
+        simulate_dataset(preparation.source, settings, workers, progress, sampler)
+        paths = [sampler.path(piece) for piece in piece_names(settings)]
+        if is_prepared(folder) or not all(path.is_file() for path in paths):
+            summary = prepare_dataset(preparation, folder, workers, progress)
+        else:
+            rows = preparation.rows()
+            preparation.claim(folder, rows)
+            summary = assemble(rows, preparation, folder, paths)
+        shutil.rmtree(sampler.scratch, ignore_errors=True)
+        return summary

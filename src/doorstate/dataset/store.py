@@ -14,7 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
+from doorstate._documents import read_json
 from doorstate._files import read_csv, write_text
+from doorstate._input import MAX_SETTINGS_BYTES
 from doorstate._models import FrozenModel
 from doorstate.clouds.preparation import CloudSpec
 from doorstate.dataset.sampling import sample_frame
@@ -228,7 +230,7 @@ def open_dataset(folder: Path) -> PreparedDataset:
     if not is_prepared(folder):
         raise DatasetError("is no prepared data set", path=folder, hint="prepare one first")
     try:
-        description = DatasetDescription.model_validate_json(path.read_text(encoding="utf-8"))
+        description = DatasetDescription.model_validate(read_json(path, DatasetError, MAX_SETTINGS_BYTES))
         replayed = description.clouds == "replayed"
         clouds = None if replayed else np.load(folder / CLOUDS_FILE, mmap_mode="r", allow_pickle=False)
         parts_path = folder / PARTS_FILE

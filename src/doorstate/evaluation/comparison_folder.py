@@ -10,11 +10,12 @@ from typing import Any
 
 import pandas as pd
 
+from doorstate._documents import read_json
 from doorstate._files import read_csv
 from doorstate.errors import DatasetError, RunError
 from doorstate.evaluation.detections import Detections, read_detections
 from doorstate.evaluation.results import PROBABILITY_COLUMNS, TEXT_COLUMNS, RunRecord
-from doorstate.training.run_folder import RunFolder, read_json, run_of
+from doorstate.training.run_folder import RunFolder, run_of
 
 COMPARISON, SPLITS = "comparison.json", "splits.csv"
 

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
@@ -11,6 +10,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from pydantic import TypeAdapter, ValidationError
 
+from doorstate._documents import parse_json
+from doorstate._input import MAX_TABLE_BYTES, read_input_text
 from doorstate.errors import RunError
 from doorstate.evaluation.views import oblique_view
 from doorstate.pages.colors import DETECTION_COLORS
@@ -30,11 +31,12 @@ def read_detections(path: Path) -> Detections:
         RunError: a line is not a record of detections.
     """
     detections: dict[str, tuple[Detection, ...]] = {}
-    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines() if path.exists() else (), 1):
+    text = read_input_text(path, MAX_TABLE_BYTES, RunError) if path.exists() else ""
+    for number, line in enumerate(text.splitlines(), 1):
         try:
-            record = json.loads(line)
+            record = parse_json(line)
             sample, shapes = _LINE.validate_python((record["sample_id"], record["detections"]))
-        except (ValueError, KeyError, TypeError, ValidationError) as error:
+        except (RunError, ValueError, KeyError, TypeError, ValidationError) as error:
             raise RunError(
                 f"line {number} is not a record of detections", path=path, hint="run this rule again"
             ) from error

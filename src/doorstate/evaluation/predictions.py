@@ -10,6 +10,7 @@ from typing import Any
 import pandas as pd
 from pydantic import ValidationError
 
+from doorstate._documents import read_json
 from doorstate.dataset.roles import Role
 from doorstate.dataset.splits import read_splits
 from doorstate.dataset.store import manifest_path
@@ -21,7 +22,7 @@ from doorstate.evaluation.manifest import read_manifest
 from doorstate.evaluation.published import save_results
 from doorstate.evaluation.results import ComparisonConfig, Results, RunRecord, order_predictions
 from doorstate.rules.base import Detection
-from doorstate.training.run_folder import read_json, run_of
+from doorstate.training.run_folder import run_of
 
 __all__ = ["Results", "is_comparison", "join_results", "load_part", "load_results", "save_results"]
 

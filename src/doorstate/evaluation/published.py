@@ -16,11 +16,11 @@ from typing import Any
 
 import pandas as pd
 
+from doorstate._documents import read_json
 from doorstate._files import write_compressed_text, write_text
 from doorstate.dataset.splits import write_splits
 from doorstate.errors import RunError
 from doorstate.evaluation.results import KEY_COLUMNS, TEXT_COLUMNS, Results, RunRecord
-from doorstate.training.run_folder import read_json
 
 EXPERIMENT, METRICS = "experiment.json", "metrics.json"
 SPLITS, PREDICTIONS = "splits.csv.gz", "predictions.csv.gz"

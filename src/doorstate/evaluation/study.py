@@ -15,6 +15,7 @@ from typing import Any
 
 import pandas as pd
 
+from doorstate._documents import read_json
 from doorstate._files import read_csv, write_csv, write_text
 from doorstate.errors import RunError
 from doorstate.evaluation.comparison_folder import COMPARISON
@@ -30,7 +31,6 @@ from doorstate.evaluation.published import (
     write_predictions,
 )
 from doorstate.evaluation.results import Results
-from doorstate.training.run_folder import read_json
 
 LATENCY = "latency.csv"
 

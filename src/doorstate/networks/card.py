@@ -3,14 +3,16 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Self
 
-from pydantic import Field
+from pydantic import Field, ValidationError
 
 from doorstate import __version__
+from doorstate._documents import parse_json
 from doorstate._models import FrozenModel
 from doorstate.clouds.normalization import SCALE_M
 from doorstate.clouds.preparation import CloudSpec
+from doorstate.errors import WeightsError, first_validation_error
 from doorstate.types import STATES
 
 CARD_KEY = "doorstate"  # of the card, in the metadata of weights files and exported networks
@@ -31,6 +33,18 @@ class WeightsCard(FrozenModel):
     abstain_below: float = Field(default=0.0, ge=0, lt=1)  # abstain if no state is more probable
     trained_on: str = ""
     doorstate_version: str = __version__
+
+    @classmethod
+    def parse(cls, text: str) -> Self:
+        """Return the card of a JSON text.
+
+        Raises:
+            WeightsError: it is no card.
+        """
+        try:
+            return cls.model_validate(parse_json(text, WeightsError))
+        except ValidationError as error:
+            raise WeightsError(first_validation_error(error)) from error
 
     @property
     def points_in_use(self) -> int:

@@ -6,9 +6,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import torch
-from pydantic import ValidationError
 from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
+from safetensors.torch import save
 
 from doorstate._files import atomic_path
 from doorstate.clouds.normalization import SCALE_M
@@ -27,7 +26,7 @@ def save_weights(path: Path, network: PointNetwork, card: WeightsCard, half: boo
         for name, tensor in network.state_dict().items()
     }
     with atomic_path(path) as temporary:
-        save_file(tensors, temporary, metadata={CARD_KEY: card.model_dump_json()})
+        temporary.write_bytes(save(tensors, {CARD_KEY: card.model_dump_json()}))
 
 
 def read_card(path: Path) -> WeightsCard:
@@ -41,10 +40,10 @@ def read_card(path: Path) -> WeightsCard:
     try:
         with safe_open(path, framework="pt") as weights:
             metadata = weights.metadata() or {}
-        return WeightsCard.model_validate_json(metadata[CARD_KEY])
+        return WeightsCard.parse(metadata[CARD_KEY])
     except (OSError, SafetensorError) as error:
         raise WeightsError(f"cannot be read as safetensors ({error})", path=path) from error
-    except (KeyError, ValidationError) as error:
+    except (KeyError, WeightsError) as error:
         raise WeightsError("has no valid card: not a weights file of doorstate", path=path) from error
 
 

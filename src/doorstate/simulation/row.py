@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
-import json
 from typing import Literal
 
 from pydantic import ConfigDict, field_serializer, field_validator
 
+from doorstate._documents import parse_json
 from doorstate._models import FrozenModel
+from doorstate.errors import DatasetError
 from doorstate.simulation.camera import CameraPose, DepthCamera
 from doorstate.simulation.scene.box import Box
 from doorstate.simulation.scene.door import Opening
@@ -76,9 +77,9 @@ class Row(FrozenModel):
     @classmethod
     def _scene_from_json(cls, scene: object) -> object:
         try:
-            return json.loads(scene) if isinstance(scene, str) else scene
-        except RecursionError as error:
-            raise ValueError("nested too deeply") from error
+            return parse_json(scene, DatasetError) if isinstance(scene, str) else scene
+        except DatasetError as error:
+            raise ValueError(error.message) from error
 
     def camera_pose(self) -> CameraPose:
         """Return the camera in the door frame."""

@@ -17,7 +17,9 @@ import numpy as np
 from PIL import Image
 from pydantic import ValidationError
 
+from doorstate._documents import read_json
 from doorstate._files import atomic_path, is_vacant, read_csv, write_csv, write_text
+from doorstate._input import MAX_SETTINGS_BYTES
 from doorstate._jobs import Progress, Shard, default_workers, no_progress, piece_paths, run_pieces
 from doorstate._locks import owned_folder
 from doorstate.errors import ConfigError, DatasetError, first_validation_error
@@ -114,10 +116,10 @@ def read_settings(folder: Path) -> SimulationSettings:
         DatasetError: it is no simulated folder, or its settings file is damaged.
     """
     path = folder / _SETTINGS
+    if not path.is_file():
+        raise DatasetError(f"holds no {_SETTINGS}: it is no simulated data set", path=folder)
     try:
-        return SimulationSettings.model_validate_json(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise DatasetError(f"holds no {_SETTINGS}: it is no simulated data set", path=folder) from error
+        return SimulationSettings.model_validate(read_json(path, DatasetError, MAX_SETTINGS_BYTES))
     except ValidationError as error:
         raise DatasetError(first_validation_error(error), path=path) from error
 

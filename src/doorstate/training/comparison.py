@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 from pydantic import ValidationError
 
+from doorstate._documents import read_json
 from doorstate._jobs import Progress, default_workers, no_progress, run_pieces
 from doorstate.dataset.loader import check_states
 from doorstate.dataset.roles import Role
@@ -21,7 +22,7 @@ from doorstate.training.experiment import Experiment
 from doorstate.training.leakage import check_extra_datasets, check_start_from
 from doorstate.training.rule_run import RuleRunConfig, run_rule
 from doorstate.training.run import torch_threads, train_run
-from doorstate.training.run_folder import RunFolder, check_same_settings, read_json, run_of, write_json
+from doorstate.training.run_folder import RunFolder, check_same_settings, run_of, write_json
 
 
 class RunSpec(NamedTuple):

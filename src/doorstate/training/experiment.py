@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from pydantic import Field, ValidationError
 
+from doorstate._documents import read_toml
 from doorstate._models import FrozenModel
 from doorstate.clouds.preparation import MIN_POINTS, NUM_POINTS
 from doorstate.dataset.splits import NUM_FOLDS, ONE_FOLD, PROTOCOLS, UNSEEN
@@ -128,15 +128,3 @@ def load_experiment(path: Path | None, overrides: Mapping[str, Any]) -> Experime
     )
     experiment.check()
     return experiment
-
-
-def read_toml(path: Path) -> dict[str, Any]:
-    """Return the content of a TOML file.
-
-    Raises:
-        ConfigError: it cannot be read.
-    """
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:  # ValueError: also integers of thousands of digits
-        raise ConfigError(f"cannot be read as TOML ({error})", path=path) from error

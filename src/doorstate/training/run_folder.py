@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from doorstate._documents import read_json
 from doorstate._files import read_csv, write_csv, write_text
 from doorstate.errors import RunError
 from doorstate.types import STATES
@@ -140,21 +141,6 @@ def write_head_outputs(path: Path, samples: Sequence[str], columns: Mapping[str,
             for sample, row in zip(samples, rows, strict=True)
         ],
     )
-
-
-def read_json(path: Path) -> dict[str, Any]:
-    """Return the JSON object of a file.
-
-    Raises:
-        RunError: the file is missing or damaged.
-    """
-    try:
-        value = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
-        raise RunError(f"cannot be read ({error})", path=path) from error
-    if not isinstance(value, dict):
-        raise RunError("holds no JSON object", path=path)
-    return value
 
 
 def write_json(path: Path, value: Mapping[str, Any]) -> None:

@@ -10,10 +10,11 @@ from typing import NamedTuple, TypeVar
 
 from pydantic import Field, ValidationError
 
+from doorstate._documents import read_toml
 from doorstate._models import FrozenModel
 from doorstate.errors import ConfigError, first_validation_error
 from doorstate.networks import list_networks
-from doorstate.training.experiment import Experiment, read_toml
+from doorstate.training.experiment import Experiment
 
 S = TypeVar("S", bound="Study")
 

@@ -7,8 +7,6 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pydantic import ValidationError
-
 from doorstate.clouds.normalization import centroids
 from doorstate.errors import WeightsError, missing_extra, summarize_exception
 from doorstate.inference.backends.base import Outputs
@@ -74,8 +72,8 @@ def _open_session(path: Path, threads: int) -> Any:
 
 def _read_card(path: Path, metadata: Mapping[str, str]) -> WeightsCard:
     try:
-        card = WeightsCard.model_validate_json(metadata[CARD_KEY])
-    except (KeyError, ValidationError) as error:
+        card = WeightsCard.parse(metadata[CARD_KEY])
+    except (KeyError, WeightsError) as error:
         raise WeightsError(
             "not exported by doorstate: its metadata hold no weights card", path=path, field=CARD_KEY
         ) from error
