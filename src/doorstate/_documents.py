@@ -74,7 +74,7 @@ def _parse(parse: Callable[[str], Any], text: str, kind: str, error: type[Doorst
 def _check_content(value: Any, error: type[DoorstateError]) -> None:
     level, depth = [value], 0
     while level:
-        if depth > MAX_DEPTH:
+        if depth == MAX_DEPTH:
             raise error("is nested too deeply", expected=f"at most {MAX_DEPTH} levels")
         for item in level:
             if isinstance(item, int) and not -_MAX_INTEGER <= item <= _MAX_INTEGER:
