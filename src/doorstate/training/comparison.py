@@ -11,6 +11,7 @@ from pydantic import ValidationError
 
 from doorstate._documents import read_json
 from doorstate._jobs import Progress, default_workers, no_progress, run_pieces
+from doorstate._locks import owned_folder
 from doorstate.dataset.loader import check_states
 from doorstate.dataset.roles import Role
 from doorstate.dataset.splits import draw_splits, read_splits, write_splits
@@ -70,13 +71,15 @@ def compare(
 
     Raises:
         RunError: the folder holds another comparison.
+        FolderInUseError: another process works in the folder.
     """
-    prepare_comparison(experiment, folder)
-    runs = plan_runs(experiment, folder)
-    threads = max(1, default_workers() // jobs) if jobs > 1 else None
-    pieces = [_Piece(experiment, folder, run.method, run.fold, threads) for run in runs]
-    run_pieces(_run_piece, pieces, [run.folder.metrics for run in runs], jobs, progress)
-    return [run.folder.read_metrics() for run in runs]
+    with owned_folder(folder):
+        prepare_comparison(experiment, folder)
+        runs = plan_runs(experiment, folder)
+        threads = max(1, default_workers() // jobs) if jobs > 1 else None
+        pieces = [_Piece(experiment, folder, run.method, run.fold, threads) for run in runs]
+        run_pieces(_run_piece, pieces, [run.folder.metrics for run in runs], jobs, progress)
+        return [run.folder.read_metrics() for run in runs]
 
 
 def prepare_comparison(experiment: Experiment, folder: Path) -> None:

@@ -13,6 +13,7 @@ import numpy as np
 from sklearn.metrics import accuracy_score, f1_score
 
 from doorstate._files import write_csv, write_text
+from doorstate._locks import owned_folder
 from doorstate._models import FrozenModel
 from doorstate.dataset.roles import Role
 from doorstate.dataset.store import PreparedDataset
@@ -57,8 +58,15 @@ def run_rule(
     Raises:
         DatasetError: there is no test sample with a door.
         RunError: the folder holds another run.
+        FolderInUseError: another process works in the folder.
     """
-    run = RunFolder(folder)
+    with owned_folder(folder):
+        return _apply(config, dataset, roles, RunFolder(folder))
+
+
+def _apply(
+    config: RuleRunConfig, dataset: PreparedDataset, roles: Mapping[str, Role], run: RunFolder
+) -> dict[str, Any]:
     run.claim(config.model_dump(mode="json"), describe_environment())
     if run.finished:
         return run.read_metrics()

@@ -12,6 +12,7 @@ from typing import Any
 import lightning_fabric
 import torch
 
+from doorstate._locks import owned_folder
 from doorstate._memory import keep_freed_memory
 from doorstate.dataset.roles import Role
 from doorstate.dataset.store import PreparedDataset
@@ -54,6 +55,7 @@ def train_run(
     Raises:
         ConfigError: there are no epochs and no weights to start from.
         RunError: the folder holds another run, or the loss is not finite.
+        FolderInUseError: another process works in the folder.
         DatasetError: a role has too few samples.
         WeightsError: the weights to start from are missing or do not fit.
     """
@@ -61,7 +63,17 @@ def train_run(
         raise ConfigError(
             "a run of 0 epochs needs weights to start from", field="epochs", expected="1 or more"
         )
-    run = RunFolder(folder)
+    with owned_folder(folder):
+        return _train(config, dataset, roles, RunFolder(folder), extra_datasets)
+
+
+def _train(
+    config: RunConfig,
+    dataset: PreparedDataset,
+    roles: Mapping[str, Role],
+    run: RunFolder,
+    extra_datasets: Sequence[PreparedDataset],
+) -> dict[str, Any]:
     run.claim(config.model_dump(mode="json"), describe_environment())
     if run.finished:
         return run.read_metrics()
