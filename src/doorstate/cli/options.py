@@ -158,7 +158,5 @@ def recipe_changes(settings: list[str] | None, epochs: int | None) -> dict[str, 
         try:
             changes[name.strip()] = parse_toml(f"value = {value}")["value"]
         except ConfigError:
-            changes[name.strip()] = tomllib.loads(f"value = {value}")["value"]
-        except (tomllib.TOMLDecodeError, ValueError, RecursionError):
             changes[name.strip()] = value.strip()
     return changes

@@ -32,6 +32,7 @@ def resolution(
       doorstate resolution paper/experiments/resolution.toml
       doorstate resolution paper/experiments/resolution.toml --jobs 2 --out runs/points
     """
+    from doorstate._locks import owned_folder
     from doorstate.cli.compare import compare_with_display
     from doorstate.cli.console import print_table
     from doorstate.evaluation.resolution import resolution_table, score_resolution, write_resolution
@@ -41,10 +42,12 @@ def resolution(
 
     settings = load_study(study, ResolutionStudy)
     folder = out or Path("runs") / settings.name
-    for part in list(settings.parts()):
-        compare_with_display(part.experiment, folder / part.folder, jobs)
-    if not (folder / LATENCY).is_file():
-        _measure_latency(settings, folder)
+    parts = list(settings.parts())
+    with owned_folder(folder):
+        for part in parts:
+            compare_with_display(part.experiment, folder / part.folder, jobs)
+        if not (folder / LATENCY).is_file():
+            _measure_latency(settings, folder)
     results = load_study_results(folder)
     write_resolution(results, folder / "report")
     table = resolution_table(score_resolution(results))

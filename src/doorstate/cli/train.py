@@ -49,16 +49,15 @@ def train(
     """
     from doorstate.cli.console import print_json, stdout
     from doorstate.cli.run_display import live_runs
-    from doorstate.dataset.splits import draw_splits, write_splits
     from doorstate.dataset.store import open_dataset
-    from doorstate.training.comparison import RunSpec, train_fold
+    from doorstate.training.comparison import RunSpec, train_alone
     from doorstate.training.experiment import load_experiment
     from doorstate.training.run_folder import RunFolder
 
     dataset = open_dataset(data)
     given = {"protocol": protocol, "seed": seed, "recipe": recipe}
     settings = {
-        "name": out.name,
+        "name": out.resolve().name,
         "dataset": str(data),
         "folds": 1,
         "networks": (network,),
@@ -68,12 +67,9 @@ def train(
         **{name: value for name, value in given.items() if value is not None},
     }
     experiment = load_experiment(None, settings)
-    splits = out / "splits.csv"
-    if not splits.is_file():
-        write_splits(splits, draw_splits(dataset.rows, experiment.protocol, experiment.seed))
     runs = [RunSpec(network, fold, RunFolder(out))]
     with live_runs(runs, {network: experiment.recipe_of(network)}, experiment.num_points, 1):
-        metrics = train_fold(experiment, out, dataset, network, fold, splits)
+        metrics = train_alone(experiment, out, dataset, network, fold)
     if as_json:
         print_json(metrics)
         return

@@ -27,6 +27,7 @@ def transfer(
       doorstate transfer paper/experiments/transfer.toml
       doorstate transfer paper/experiments/transfer.toml --jobs 2 --out runs/elsewhere
     """
+    from doorstate._locks import owned_folder
     from doorstate.cli.compare import compare_with_display
     from doorstate.cli.console import print_table, stdout
     from doorstate.evaluation.study import load_study_results
@@ -37,9 +38,10 @@ def transfer(
     settings = load_study(study, TransferStudy)
     folder = out or Path("runs") / settings.name
     parts = list(settings.parts())
-    settings.prepare(folder)
-    for part in parts:
-        compare_with_display(part.experiment, folder / part.folder, jobs)
+    with owned_folder(folder):
+        settings.prepare(folder)
+        for part in parts:
+            compare_with_display(part.experiment, folder / part.folder, jobs)
     results = load_study_results(folder)
     scores = score_transfer(results, tuple(settings.trained), tuple(settings.tested))
     table = transfer_table(scores)

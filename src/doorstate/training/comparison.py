@@ -128,6 +128,20 @@ def read_comparison(folder: Path) -> dict[str, Any]:
     return experiment.model_dump(mode="json") | settings
 
 
+def train_alone(
+    experiment: Experiment, folder: Path, dataset: PreparedDataset, network: str, fold: int
+) -> dict[str, Any]:
+    """Draw the splits, unless the folder has them, and train one network on one fold, all in the folder of the run.
+
+    Arguments, result and errors are those of `train_fold`.
+    """
+    splits_path = folder / "splits.csv"
+    with owned_folder(folder):
+        if not splits_path.is_file():
+            write_splits(splits_path, draw_splits(dataset.rows, experiment.protocol, experiment.seed))
+        return train_fold(experiment, folder, dataset, network, fold, splits_path)
+
+
 def train_fold(
     experiment: Experiment,
     folder: Path,
