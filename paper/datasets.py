@@ -87,8 +87,9 @@ def dataset_commands(prepared: Path) -> Iterator[Command]:
     """
     name, _, points = prepared.name.rpartition("-")
     if name not in JOINED:
-        options = "" if name.endswith("ogurob") else f" {LIMITS}"
-        output = f"--prepared data/{name}-{points} --points {points}{options}"
+        limits = "" if name.endswith("ogurob") else f" {LIMITS}"
+        # The published clouds were made before outliers were removed.
+        output = f"--prepared data/{name}-{points} --points {points}{limits} --keep-outliers"
         yield Command(f"simulate {SIMULATED[name]} --out data/{name} {output}", prepared)
     elif not is_prepared(prepared):
         parts = [prepared.with_name(f"{part}-{points}") for part in JOINED[name]]

@@ -329,6 +329,8 @@ def test_changed_files_are_another_preparation(class_folders: Path, tmp_path: Pa
 def test_a_source_without_usable_clouds_is_refused_with_the_first_reason(
     class_folders: Path, tmp_path: Path
 ) -> None:
-    with pytest.raises(DatasetError, match=r"none of the 10 clouds could be prepared; the first: .*600"):
+    with pytest.raises(
+        DatasetError, match=r"none of the 10 clouds could be prepared; the first: .*(599|600)"
+    ):
         prepare_dataset(Preparation(class_folders, CloudSpec(num_points=4096)), tmp_path / "doors", workers=1)
     assert not (tmp_path / "doors").exists(), "the folder can be used again"

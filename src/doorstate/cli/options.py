@@ -81,6 +81,12 @@ Thin = Annotated[
         "--thin", help="Sample from every second, third, ... row and column of an image, as predict does."
     ),
 ]
+KeepOutliers = Annotated[
+    bool,
+    typer.Option(
+        "--keep-outliers", help="Keep pixels and small blobs that float before or behind every surface."
+    ),
+]
 ShardOption = Annotated[
     str | None,
     typer.Option(help="Process only this part of the work, such as 2/8; without it, all parts are joined."),

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from doorstate.cli.options import (
+    KeepOutliers,
     LayoutName,
     MaxDepth,
     PreparedPoints,
@@ -44,6 +45,7 @@ def prepare(
     layout: LayoutName = None,
     max_depth: MaxDepth = None,
     thin: Thin = False,
+    keep_outliers: KeepOutliers = False,
     *,
     options: ReadOptions,
 ) -> None:
@@ -70,7 +72,7 @@ def prepare(
     check_layout(layout, options)
     if layout is not None and poses is not None:
         raise ConfigError("--poses cannot be combined with --layout")
-    spec = CloudSpec(num_points=points, thin=thin, max_depth_m=max_depth)
+    spec = CloudSpec(num_points=points, thin=thin, max_depth_m=max_depth, remove_outliers=not keep_outliers)
     preparation = Preparation(source, spec, poses, options, layout)
     if shard is not None:
         part = Shard.parse(shard)

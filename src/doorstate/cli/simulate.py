@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from doorstate.cli.choices import PRESET, RAW_KIND, SENSOR, split_names
-from doorstate.cli.options import MaxDepth, PreparedPoints, ShardOption, Thin, Workers
+from doorstate.cli.options import KeepOutliers, MaxDepth, PreparedPoints, ShardOption, Thin, Workers
 from doorstate.errors import ConfigError
 
 
@@ -51,6 +51,7 @@ def simulate(
     points: PreparedPoints = 4096,
     max_depth: MaxDepth = None,
     thin: Thin = False,
+    keep_outliers: KeepOutliers = False,
 ) -> None:
     """Simulate doors seen by a depth camera.
 
@@ -79,9 +80,10 @@ def simulate(
     kept = split_names(keep)
     kinds = tuple(kind for kind in RAW_KINDS if kind in kept)
     settings = settings_for(preset, seed, poses, scenes, kinds, sensor)
-    preparation = Preparation(out, CloudSpec(num_points=points, thin=thin, max_depth_m=max_depth))
+    spec = CloudSpec(num_points=points, thin=thin, max_depth_m=max_depth, remove_outliers=not keep_outliers)
+    preparation = Preparation(out, spec)
     if prepared is None and preparation != Preparation(out):
-        raise ConfigError("--points, --max-depth-m and --thin need --prepared")
+        raise ConfigError("--points, --max-depth-m, --thin and --keep-outliers need --prepared")
     if shard is not None:
         part = Shard.parse(shard)
         with progress_bar("Simulating") as progress:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from doorstate._models import FrozenModel
 from doorstate.clouds.measured import is_measured
+from doorstate.clouds.outliers import remove_outliers
 from doorstate.clouds.samplers import Sampler
 from doorstate.clouds.sampling import farthest_point_indices
 from doorstate.clouds.shape import check_shape
@@ -23,7 +24,7 @@ MIN_POINTS = 128  # fewer cannot fill the largest neighbourhood of a network
 
 
 class CloudSpec(FrozenModel):
-    """Preparation of a cloud: number of points, thinning and depth limit.
+    """Preparation of a cloud: number of points, thinning, depth limit and outliers.
 
     Attributes:
         num_points: points to keep.
@@ -32,11 +33,14 @@ class CloudSpec(FrozenModel):
             faster, and no point moves by more than a few pixels or a cell.
         max_depth_m: drop points farther ahead, along x. Farthest-point sampling spreads over space, so that surfaces
             beyond the training data, such as the end of a corridor, would take most of the points.
+        remove_outliers: drop pixels and small blobs that float before or behind every surface (`clouds.outliers`).
+            Farthest-point sampling would pick them first.
     """
 
     num_points: int = NUM_POINTS
     thin: bool = False
     max_depth_m: float | None = None
+    remove_outliers: bool = True
 
 
 DEFAULT_SPEC = CloudSpec()
@@ -59,7 +63,7 @@ def prepare_cloud(
     Args:
         points: (N, 3) or organized (H, W, 3) metres; NaN, infinite, (0, 0, 0) or beyond 1000 km where nothing was
             measured.
-        spec: number of points, thinning and depth limit.
+        spec: number of points, thinning, depth limit and outliers.
         sampler: implementation of farthest point sampling; all give the same points. None: `choose_sampler()`.
 
     Raises:
@@ -67,6 +71,8 @@ def prepare_cloud(
         TooFewPointsError: empty, nothing measured, or fewer than 128 distinct points.
     """
     cloud = check_shape(points)
+    if spec.remove_outliers:
+        cloud = remove_outliers(cloud).points
     rows, clean = _candidates(cloud, spec)
     sampled = farthest_point_indices(clean, min(spec.num_points, len(clean)), sampler)
     # Sampling repeats a point only after all distinct ones, so the repeats are at the end.

@@ -74,20 +74,23 @@ def _join(sources: Sequence[Path], folder: Path) -> PreparedDataset:
         samples=len(rows),
         max_depth_m=None if None in limits_m else max(limit_m for limit_m in limits_m if limit_m),
         thin=datasets[0].description.thin,
+        remove_outliers=datasets[0].description.remove_outliers,
         doorstate_version=__version__,
     ).save(folder)
     return open_dataset(folder)
 
 
 def check_same_sampling(dataset: PreparedDataset, reference: PreparedDataset) -> None:
-    """Raise ConfigError if one data set was thinned before sampling and the other was not."""
-    if dataset.description.thin != reference.description.thin:
-        raise ConfigError(
-            f"thin is {dataset.description.thin}",
-            path=dataset.folder,
-            expected=f"{reference.description.thin} as in {reference.folder}",
-            hint="prepare the data sets with the same settings",
-        )
+    """Raise ConfigError if only one data set was thinned, or cleaned of outliers, before sampling."""
+    for name in ("thin", "remove_outliers"):
+        value, expected = (getattr(each.description, name) for each in (dataset, reference))
+        if value != expected:
+            raise ConfigError(
+                f"{name} is {value}",
+                path=dataset.folder,
+                expected=f"{expected} as in {reference.folder}",
+                hint="prepare the data sets with the same settings",
+            )
 
 
 def _is_unfinished(folder: Path) -> bool:

@@ -32,7 +32,8 @@ class Sampler:
     def scratch(self) -> Path:
         """Folder of the clouds until all pieces are done."""
         spec = self.preparation.spec
-        return self.preparation.source / f"sampled-{spec.num_points}-{spec.max_depth_m}-{spec.thin}"
+        settings = (spec.num_points, spec.max_depth_m, spec.thin, spec.remove_outliers)
+        return self.preparation.source / f"sampled-{'-'.join(map(str, settings))}"
 
     def path(self, piece: str) -> Path:
         """Return the file of the clouds of a piece."""

@@ -44,11 +44,17 @@ class DatasetDescription(FrozenModel):
     clouds: Literal["stored", "replayed"] = "stored"  # replayed: rendered from the manifest
     max_depth_m: float | None = None  # points farther ahead were left out
     thin: bool = False  # sampled from some rows and columns of each image, as a predictor does
+    remove_outliers: bool = False  # not in data sets of version 0.1
 
     @property
     def spec(self) -> CloudSpec:
         """Settings the clouds were prepared with."""
-        return CloudSpec(num_points=self.num_points, thin=self.thin, max_depth_m=self.max_depth_m)
+        return CloudSpec(
+            num_points=self.num_points,
+            thin=self.thin,
+            max_depth_m=self.max_depth_m,
+            remove_outliers=self.remove_outliers,
+        )
 
     def save(self, folder: Path) -> None:
         """Write `dataset.json`, which marks the folder as complete."""

@@ -12,6 +12,7 @@ from doorstate.errors import DoorstateError, TooFewPointsError, WriteParameter, 
 AbstentionCode = Literal[
     "too_few_points",  # nothing or hardly anything was measured
     "low_coverage",
+    "outliers",  # too many points float in mid-air
     "points_behind_camera",
     "too_near",
     "too_far",
@@ -29,6 +30,7 @@ AbstentionCode = Literal[
 SENTENCES: dict[AbstentionCode, str] = {
     "too_few_points": "too few points were measured: at least {min_points} are needed",
     "low_coverage": "only {share:.0%} of the cloud was measured: at least {min_share:.0%} are needed",
+    "outliers": "{share:.1%} of the points float before or behind every surface: at most {max_share:.0%} may",
     "points_behind_camera": "{share:.0%} of the points lie behind the camera: a scan, or a cloud in another frame",
     "too_near": "half of the points are within {median_m:.2f} m: something is before the camera",
     "too_far": "half of the points are beyond {median_m:.1f} m: too far away for a door",

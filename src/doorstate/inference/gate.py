@@ -23,6 +23,7 @@ _SHARES = (
     "hole_height_share",
     "max_hole_share",
     "margin_share",
+    "max_outlier_share",
 )
 _MAX_MARGIN_SHARE = 0.4
 _LARGE_IMAGE_ROWS = 240  # from here on every other row and column is enough
@@ -52,6 +53,7 @@ class Gate:
             that the packaged weights were trained on (3.5 m).
         max_hole_share: largest share of the columns with holes and no such floor; chosen: 0.25 m of a door 3 m away
             with a lens of 60 degrees.
+        max_outlier_share: largest share of outliers among the measured points; TODO.
         margin_share: columns ignored on each side; chosen: stereo and registered cameras measure nothing in up to a
             tenth.
 
@@ -70,6 +72,7 @@ class Gate:
     free_reach_m: float = 4.0
     max_hole_share: float = 0.1
     margin_share: float = 0.1
+    max_outlier_share: float = 0.1
 
     def __post_init__(self) -> None:
         # A share out of range would switch its check off silently.
@@ -83,13 +86,17 @@ class Gate:
                 expected=f"at most {_MAX_MARGIN_SHARE}",
             )
 
-    def __call__(self, cloud: Points) -> Abstention | None:
+    def __call__(self, cloud: Points, outlier_share: float = 0.0) -> Abstention | None:
         """Return the reason why a cloud cannot be used, or None if it can.
 
         Args:
             cloud: (N, 3) or organized (H, W, 3) metres, x forward, y left, z up, NaN where nothing
                 was measured. Holes are searched in organized clouds, and in flat ones of 4800 points or more.
+            outlier_share: share of its measured points that was removed before (`clouds.outliers`).
         """
+        if outlier_share > self.max_outlier_share:
+            values = {"share": outlier_share, "max_share": self.max_outlier_share}
+            return Abstention("outliers", values)
         view = _View.from_cloud(np.asarray(cloud))
         checks = (
             self._enough_points,

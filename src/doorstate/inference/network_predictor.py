@@ -35,6 +35,7 @@ class NetworkPredictor(Predictor):
         thin: sample from some rows and columns of an organized cloud, which is several times quicker, and not from
             all as in training (clouds.preparation).
         gate: rejects clouds in which too much is missing; None rejects nothing.
+        remove_outliers: remove outliers before gate and network; None takes the setting recorded with the weights.
         clock: seconds, for `milliseconds` and time budgets.
 
     Raises:
@@ -48,12 +49,14 @@ class NetworkPredictor(Predictor):
         *,
         thin: bool = True,
         gate: Gate | None = DEFAULT_GATE,
+        remove_outliers: bool | None = None,
         clock: Callable[[], float] = time.perf_counter,
     ) -> None:
         self.backend = backend
         self.card = backend.card
         self.num_points = self.card.points_in_use if num_points is None else num_points
         self.gate = gate
+        self.removes_outliers = self.card.remove_outliers if remove_outliers is None else remove_outliers
         self.clock = clock
         if self.num_points < MIN_POINTS:
             raise ConfigError(
@@ -63,7 +66,13 @@ class NetworkPredictor(Predictor):
             raise ConfigError(
                 f"the exported network takes {backend.num_points} points, not {num_points}: export it again"
             )
-        self.spec = CloudSpec(num_points=self.num_points, thin=thin, max_depth_m=self.card.max_depth_m)
+        self.spec = CloudSpec(
+            num_points=self.num_points,
+            thin=thin,
+            max_depth_m=self.card.max_depth_m,
+            remove_outliers=self.removes_outliers,
+        )
+        self._spec_of_clean = self.spec.model_copy(update={"remove_outliers": False})
 
     @classmethod
     def from_weights(
@@ -138,7 +147,10 @@ class NetworkPredictor(Predictor):
             CloudContentError: as for a call.
             TooFewPointsError: there are not enough.
         """
-        prepared = prepare_cloud(cloud, self.spec)
+        return self._prepare(cloud, self.spec)
+
+    def _prepare(self, cloud: Points, spec: CloudSpec) -> PreparedCloud:
+        prepared = prepare_cloud(cloud, spec)
         if self.backend.num_points is not None and len(prepared.points) < self.backend.num_points:
             raise TooFewPointsError(
                 f"too few points: {len(prepared.points)} distinct, but the exported network takes "
@@ -154,12 +166,13 @@ class NetworkPredictor(Predictor):
         self.backend(prepare_cloud(cloud, CloudSpec(num_points=self.num_points)).points[None])
 
     def _sample(self, cloud: Points) -> _Sample:
-        """Sample one cloud, unless it has too few points, and check it with the gate."""
+        """Clean and sample one cloud, unless it has too few points, and check it with the gate."""
+        clean = self._clean(cloud)
         try:
-            points = self.prepare(cloud).points
+            points = self._prepare(clean.points, self._spec_of_clean).points
         except TooFewPointsError as error:
             return _Sample(_NO_POINTS, Abstention.from_error(error))
-        return _Sample(points, None if self.gate is None else self.gate(cloud))
+        return _Sample(points, self._gate(clean))
 
 
 class _Sample(NamedTuple):

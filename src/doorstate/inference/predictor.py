@@ -8,8 +8,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from doorstate._memory import keep_freed_memory
+from doorstate.clouds.outliers import CleanCloud, remove_outliers
 from doorstate.clouds.preparation import CloudSpec, PreparedCloud, prepare_cloud
 from doorstate.errors import ConfigError
+from doorstate.inference.abstention import Abstention
 from doorstate.inference.gate import DEFAULT_GATE, Gate
 from doorstate.inference.prediction import Prediction
 from doorstate.types import Points
@@ -21,7 +23,14 @@ class Predictor(ABC):
     """Network or rule that predicts the state of the door in a cloud.
 
     Nothing in a predictor changes after it is made: threads may share one.
+
+    Attributes:
+        gate: rejects clouds in which too much is missing or floats in mid-air; None rejects nothing.
+        removes_outliers: remove outliers first, so that gate, network and rule get the same points.
     """
+
+    gate: Gate | None
+    removes_outliers: bool
 
     @classmethod
     def load(
@@ -102,6 +111,14 @@ class Predictor(ABC):
             TooFewPointsError: there are not enough.
         """
         return prepare_cloud(cloud, CloudSpec(thin=True))
+
+    def _clean(self, cloud: Points) -> CleanCloud:
+        """Return the cloud that gate, network and rule get."""
+        return remove_outliers(cloud) if self.removes_outliers else CleanCloud(cloud, 0.0)
+
+    def _gate(self, clean: CleanCloud) -> Abstention | None:
+        """Return the reason why the gate rejects a cloud, or None."""
+        return None if self.gate is None else self.gate(clean.points, clean.outlier_share)
 
     def warm_up(self) -> None:
         """Make the first call as quick as later ones; the process keeps freed memory from then on."""

@@ -6,8 +6,6 @@ from __future__ import annotations
 import time
 from typing import Any
 
-import numpy as np
-
 from doorstate.clouds.shape import check_single_cloud
 from doorstate.errors import TooFewPointsError
 from doorstate.inference.abstention import Abstention
@@ -25,11 +23,15 @@ class RulePredictor(Predictor):
     Args:
         rule: method to apply.
         gate: rejects clouds in which too much is missing; a rule would take missing data for a free way as well.
+        remove_outliers: remove outliers before gate and rule.
     """
 
-    def __init__(self, rule: Rule[Any], *, gate: Gate | None = DEFAULT_GATE) -> None:
+    def __init__(
+        self, rule: Rule[Any], *, gate: Gate | None = DEFAULT_GATE, remove_outliers: bool = True
+    ) -> None:
         self.rule = rule
         self.gate = gate
+        self.removes_outliers = remove_outliers
 
     @classmethod
     def from_name(cls, name: str, *, gate: Gate | None = DEFAULT_GATE) -> RulePredictor:
@@ -57,15 +59,15 @@ class RulePredictor(Predictor):
             CloudContentError: not one cloud.
         """
         started = time.perf_counter()
-        cloud = check_single_cloud(cloud)
-        num_points = len(measured_points(cloud))
+        clean = self._clean(check_single_cloud(cloud))
+        num_points = len(measured_points(clean.points))
         if num_points == 0:
             error = TooFewPointsError("nothing was measured: the cloud holds no points")
             return Prediction.abstain(Abstention.from_error(error))
-        abstention = None if self.gate is None else self.gate(cloud)
+        abstention = self._gate(clean)
         if abstention is not None:
             return Prediction.abstain(abstention, num_points, _milliseconds_since(started))
-        result = self.rule(np.asarray(cloud))
+        result = self.rule(clean.points)
         milliseconds = _milliseconds_since(started)
         if result.state is None:
             abstention = Abstention("no_rule_result", message=result.reason)

@@ -29,6 +29,7 @@ class WeightsCard(FrozenModel):
     scale_m: float = SCALE_M
     states: tuple[str, ...] = STATES
     max_depth_m: float | None = Field(default=None, gt=0)  # range of the camera of the training clouds
+    remove_outliers: bool = True  # before sampling, whatever the training clouds were
     temperature: float = Field(default=1.0, gt=0)  # logits are divided by it (training.calibration)
     abstain_below: float = Field(default=0.0, ge=0, lt=1)  # abstain if no state is more probable
     trained_on: str = ""
@@ -54,4 +55,8 @@ class WeightsCard(FrozenModel):
     @property
     def spec(self) -> CloudSpec:
         """Preparation of the clouds that these weights take by default."""
-        return CloudSpec(num_points=self.points_in_use, max_depth_m=self.max_depth_m)
+        return CloudSpec(
+            num_points=self.points_in_use,
+            max_depth_m=self.max_depth_m,
+            remove_outliers=self.remove_outliers,
+        )

@@ -15,6 +15,7 @@ from doorstate.simulation.camera import CAMERAS, CameraPose, DepthCamera
 from doorstate.simulation.noise.axial import Axial, add_noise
 from doorstate.simulation.noise.dropout import Grazing, Speckle, lose_grazing, lose_speckle
 from doorstate.simulation.noise.edges import Edges, blur_edges
+from doorstate.simulation.noise.ghosts import Ghosts, add_ghosts
 from doorstate.simulation.noise.lateral import Lateral, draw_moves
 from doorstate.simulation.noise.materials import Materials, lose_patches, loss_shares
 from doorstate.simulation.noise.quantisation import (
@@ -46,6 +47,7 @@ class SensorModel(FrozenModel):
     grazing: Grazing | None = None
     edges: Edges | None = None
     speckle: Speckle | None = None
+    ghosts: Ghosts | None = None
     depth_steps: DepthSteps | None = None
 
     def added_sigma_m(
@@ -126,6 +128,8 @@ def distort(
         depth_m = blur_edges(depth_m, surface_m, model.edges, stage_rng(seed, "edges"))
     if model.speckle is not None:
         depth_m = lose_speckle(depth_m, model.speckle, stage_rng(seed, "speckle"))
+    if model.ghosts is not None:
+        depth_m = add_ghosts(depth_m, model.ghosts, stage_rng(seed, "ghosts"))
     if model.depth_steps is not None:
         depth_m = round_depth(depth_m, model.depth_steps)
     return rendered._replace(depth_m=depth_m)
