@@ -33,16 +33,18 @@ def gate(
 
 
 @app.command()
-def thinning(
-    out: Out = Path("docs/benchmarks"), network: Network = "ogurob-pointnet2", count: Count = 300
-) -> None:
-    """Compare predictions from a part of the pixels with predictions from all pixels."""
+def thinning(out: Out = Path("docs/benchmarks"), network: Network = "pointnet2", count: Count = 300) -> None:
+    """Compare predictions and times of sampling from a part of the points with those from all points."""
     from doorstate.cli.progress import progress_bar
 
+    from .frames import varied_frames
     from .thinning import measure_thinning, thinning_table
 
     with progress_bar("thinning") as progress:
-        table = thinning_table(measure_thinning(network, count, progress))
+        frames = varied_frames(count, progress)
+        table = thinning_table(
+            measure_thinning(network, ((row.state, frame.points) for row, frame in frames))
+        )
     _write(table, out / "thinning.md", network=network)
 
 

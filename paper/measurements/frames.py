@@ -8,7 +8,19 @@ from collections.abc import Iterator
 from doorstate._jobs import Progress
 from doorstate.inference.reference_clouds import reference_rows
 from doorstate.simulation.frames import Frame, replay
+from doorstate.simulation.presets import PRESETS
 from doorstate.simulation.row import Row
+from doorstate.simulation.settings import SimulationSettings
+
+_SEED = 1_000_003  # of no data set
+_SOURCES = (
+    ("ogurob", "none"),
+    ("varied", "none"),
+    ("varied", "xtion"),
+    ("varied", "d435"),
+    ("varied", "deepdoors2"),
+    ("cluttered", "kinect"),
+)
 
 
 def reference_frames(count: int, progress: Progress) -> Iterator[tuple[Row, Frame]]:
@@ -17,3 +29,19 @@ def reference_frames(count: int, progress: Progress) -> Iterator[tuple[Row, Fram
         progress(number, count)
         yield row, replay(row)
     progress(count, count)
+
+
+def varied_frames(count: int, progress: Progress) -> Iterator[tuple[Row, Frame]]:
+    """Yield rows and frames of doors in all states from several presets, scenes and sensors, in equal shares."""
+    sources = [
+        SimulationSettings(preset=PRESETS[preset], seed=_SEED, sensor=sensor) for preset, sensor in _SOURCES
+    ]
+    number = 0
+    for index in range(count):
+        for source in sources:
+            for row, frame in zip(*source.simulate(index), strict=True):
+                if number == count:
+                    return
+                progress(number, count)
+                number += 1
+                yield row, frame

@@ -19,6 +19,7 @@ from onnx import TensorProto, helper
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import ConfigError, MissingExtraError, WeightsError
 from doorstate.inference.backends.onnx_backend import OnnxBackend
+from doorstate.inference.backends.threads import default_threads
 from doorstate.inference.network_predictor import NetworkPredictor
 from doorstate.inference.predictor import Predictor
 from doorstate.networks import create_network
@@ -100,13 +101,17 @@ def test_the_number_of_points_is_fixed(exported: Path) -> None:
 def test_threads_are_an_argument_or_set_by_the_environment(
     exported: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def of(backend: OnnxBackend) -> int:
-        return int(backend._session.get_session_options().intra_op_num_threads)
+    def options(backend: OnnxBackend) -> tuple[int, str]:
+        used = backend._session.get_session_options()
+        return int(used.intra_op_num_threads), used.get_session_config_entry(
+            "session.intra_op.allow_spinning"
+        )
 
     monkeypatch.setenv("OMP_NUM_THREADS", "3")
-    assert (of(OnnxBackend(exported)), of(OnnxBackend(exported, threads=2))) == (3, 2)
+    assert options(OnnxBackend(exported)) == (3, "0")
+    assert options(OnnxBackend(exported, threads=2)) == (2, "0")
     monkeypatch.delenv("OMP_NUM_THREADS")
-    assert of(OnnxBackend(exported)) == 0
+    assert options(OnnxBackend(exported, spinning=True)) == (default_threads(), "1")
 
 
 def test_unusable_files_are_weights_errors(tmp_path: Path, exported: Path) -> None:

@@ -5,12 +5,14 @@ from __future__ import annotations
 
 import pytest
 from paper.measurements.export import ExportResult, export_table, measure_export
+from paper.measurements.frames import varied_frames
 from paper.measurements.gate import FAULTS, gate_table, measure_gate
 from paper.measurements.thinning import measure_thinning, thinning_table
 
 from doorstate._jobs import no_progress
 from doorstate.inference.reference_clouds import reference_clouds
 from doorstate.networks.packaged import packaged_weights
+from doorstate.types import STATES
 
 
 def test_exported_networks_agree_with_torch() -> None:
@@ -29,13 +31,23 @@ def test_network_that_is_not_written_has_a_row() -> None:
     assert table.rows == (("dgcnn", "onnxruntime", "not written", *["–"] * 4),)
 
 
-def test_thinning_gives_probabilities_of_both_samplings() -> None:
-    results = measure_thinning("ogurob-pointnet2", 3, no_progress)
-    assert len(results) == 3
+def test_thinning_has_a_row_for_every_number_of_candidates() -> None:
+    frames = varied_frames(2, no_progress)
+    results = measure_thinning("pointnet2", ((row.state, frame.points) for row, frame in frames))
+    assert len(results) == 2 * 9
     for result in results:
-        assert sum(result.thinned.raw_probabilities.values()) == pytest.approx(1)
-        assert sum(result.full.raw_probabilities.values()) == pytest.approx(1)
-    assert thinning_table(results).rows[0][0] == "3"
+        assert result.probabilities.sum() == pytest.approx(1, abs=1e-5)
+        assert 1024 <= result.candidates <= 640 * 480
+    rows = thinning_table(results).rows
+    assert [row[1] for row in rows] == ["all", *2 * ("2", "4", "8", "16")]
+    assert rows[0][3] == "2 of 2"
+    assert float(rows[0][6]) == 0
+
+
+def test_varied_frames_have_many_sensors() -> None:
+    rows = [row for row, _ in varied_frames(18, no_progress)]
+    assert {row.sensor for row in rows} == {"none", "xtion", "d435", "deepdoors2", "kinect"}
+    assert {row.state for row in rows} == set(STATES)
 
 
 def test_gate_only_removes_states() -> None:

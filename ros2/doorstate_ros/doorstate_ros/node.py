@@ -22,6 +22,7 @@ from std_msgs.msg import Bool, ColorRGBA, Header, String
 from visualization_msgs.msg import Marker, MarkerArray
 
 from doorstate.errors import DoorstateError
+from doorstate.inference.backends.threads import configure_torch
 from doorstate.inference.door_report import UNKNOWN, DoorReport
 from doorstate.inference.watch import DoorWatch
 from doorstate.inference.watch_settings import WatchSettings, parse_settings
@@ -54,6 +55,7 @@ class DoorNode:
     def __init__(self, node: Node) -> None:
         self._node = node
         settings = declare_settings(node)
+        configure_torch(settings.threads or None, used=settings.weights.endswith(".safetensors"))
         self._watch = DoorWatch(settings)
         self._state = node.create_publisher(String, "~/state", LATCHED)
         self._open = node.create_publisher(Bool, "~/open", LATCHED)

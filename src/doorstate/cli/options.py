@@ -49,6 +49,12 @@ BudgetMs = Annotated[
     ),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, one object a line, in place of a table.")]
+Threads = Annotated[
+    int | None,
+    typer.Option(
+        help="Processor threads of one call to a network. [default: one a processor, at most 4]", min=1
+    ),
+]
 
 # Recordings.
 Bag = Annotated[

@@ -18,6 +18,7 @@ from doorstate.cli.options import (
     NetworkNames,
     PointCount,
     RuleNames,
+    Threads,
     Topic,
     WeightsFiles,
     check_source,
@@ -42,6 +43,7 @@ def predict(
     rule: RuleNames = None,
     points: PointCount = None,
     budget_ms: BudgetMs = None,
+    threads: Threads = None,
     as_json: AsJson = False,
     bag: Bag = None,
     topic: Topic = None,
@@ -85,7 +87,7 @@ def predict(
         output = Output("stamp_s", "message", out, as_json)
         # The predictor is loaded after the bag was opened, because it takes longer.
         predict_bag(
-            lambda: load_predictors(methods, points, budget_ms=budget_ms),
+            lambda: load_predictors(methods, points, budget_ms=budget_ms, threads=threads),
             bag,
             options,
             topic,
@@ -95,7 +97,7 @@ def predict(
         )
         return
     sources = _find(files or [])
-    predictors = load_predictors(methods, points, budget_ms=budget_ms)
+    predictors = load_predictors(methods, points, budget_ms=budget_ms, threads=threads)
     clouds = (_predict_file(predictors, source, options) for source in sources)
     names = [_name(source) for source in sources if isinstance(source, Path)]
     Output("file", "file", out, as_json).write(clouds, list(predictors), names, len(sources))

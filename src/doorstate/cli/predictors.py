@@ -61,10 +61,12 @@ def load_predictors(
         DoorstateError: see `Predictor.load`.
     """
     from doorstate.cli.progress import working
+    from doorstate.inference.backends.threads import configure_torch
     from doorstate.inference.predictor import Predictor
 
     choices = methods.choices()
     mixed = any(choice is not None for choice in choices.values())
+    configure_torch(threads, used=any(path.suffix == ".safetensors" for path in methods.weights or ()))
     predictors = {}
     for name, choice in choices.items():
         is_plain = choice is None and mixed

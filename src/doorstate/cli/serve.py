@@ -33,6 +33,13 @@ def serve(
     workers: Annotated[
         int | None, typer.Option(help="Number of worker threads. [default: one a processor]", min=1)
     ] = None,
+    threads: Annotated[
+        int | None,
+        typer.Option(
+            help="Processor threads of one call to a network. [default: all processors, shared by the workers]",
+            min=1,
+        ),
+    ] = None,
     verbose: Annotated[bool, typer.Option("--verbose", help="Log requests on standard error.")] = False,
 ) -> None:
     """Serve predictions over HTTP.
@@ -56,11 +63,7 @@ def serve(
 
     workers = workers or default_workers()
     limits = Limits(int(max_megabytes * 2**20), timeout_s, queue, workers)
-    threads = max(1, default_workers() // workers)
-    if not rule and not (weights and weights[0].suffix == ".onnx"):
-        import torch
-
-        torch.set_num_threads(threads)
+    threads = threads or max(1, default_workers() // workers)
     predictor = load_predictor(Methods(network, weights, rule), points, budget_ms=budget_ms, threads=threads)
     listener = listen(host, port)
     server = create_server(create_app(predictor, limits), timeout_s, verbose)

@@ -14,7 +14,7 @@ from doorstate.clouds.outliers import remove_outliers
 from doorstate.clouds.samplers import Sampler
 from doorstate.clouds.sampling import farthest_point_indices
 from doorstate.clouds.shape import check_shape
-from doorstate.clouds.thinning import thinned_pixels, thinned_points
+from doorstate.clouds.thinning import CELLS_PER_POINT, PIXELS_PER_POINT, thinned_pixels, thinned_points
 from doorstate.clouds.units import check_units, median_range_m
 from doorstate.errors import TooFewPointsError
 from doorstate.types import MAX_COORDINATE, Indices, Points
@@ -88,7 +88,7 @@ def _candidates(cloud: Points, spec: CloudSpec) -> tuple[Indices, Points]:
     rows = np.arange(len(flat))
     organized = cloud.ndim == 3
     if spec.thin and organized:
-        rows = thinned_pixels(cloud.shape[0], cloud.shape[1], spec.num_points)
+        rows = thinned_pixels(cloud.shape[0], cloud.shape[1], PIXELS_PER_POINT * spec.num_points)
         flat = flat[rows]
     flat = np.asarray(flat, dtype=np.float32)
     measured = _measured_rows(flat)
@@ -98,7 +98,7 @@ def _candidates(cloud: Points, spec: CloudSpec) -> tuple[Indices, Points]:
         near = _near_points(clean, spec.max_depth_m)
         rows, clean = rows[near], clean[near]
     if spec.thin and not organized:
-        kept = thinned_points(clean, spec.num_points)
+        kept = thinned_points(clean, CELLS_PER_POINT * spec.num_points)
         rows, clean = rows[kept], clean[kept]
     return rows, clean
 

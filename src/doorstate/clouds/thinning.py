@@ -23,25 +23,24 @@ _SPREAD = (
 )
 
 
-def thinned_pixels(height: int, width: int, num_points: int) -> Indices:
-    """Return the rows, in the flattened image, of the pixels in every k-th row and column."""
-    step = max(1, int(np.sqrt(height * width / (PIXELS_PER_POINT * num_points))))
+def thinned_pixels(height: int, width: int, fewest: int) -> Indices:
+    """Return the rows, in the flattened image, of the pixels in every k-th row and column, at least `fewest`."""
+    step = max(1, int(np.sqrt(height * width / fewest)))
     return (np.arange(0, height, step)[:, None] * width + np.arange(0, width, step)).ravel()
 
 
-def thinned_points(points: Points, num_points: int) -> Indices:
+def thinned_points(points: Points, fewest: int) -> Indices:
     """Return the rows, ascending, of one point in each occupied cell of the coarsest grid that leaves enough.
 
-    The grid divides the bounding cube of the cloud, halved along x, y and z in turn until at least `CELLS_PER_POINT`
-    times `num_points` cells are occupied. A cell keeps its first point on a Z-order curve (Morton 1966), and of points
+    The grid divides the bounding cube of the cloud, halved along x, y and z in turn until at least `fewest` cells
+    are occupied. A cell keeps its first point on a Z-order curve (Morton 1966), and of points
     closer together than 1 / 131,072 of the cube the one with the lowest row.
 
     Args:
         points: (N, 3) metres, finite.
-        num_points: points that will be sampled; all rows are returned if there are not enough cells.
+        fewest: number of points to keep at least; without so many distinct points, all rows are returned.
     """
-    enough = CELLS_PER_POINT * num_points
-    if len(points) <= enough:
+    if len(points) <= fewest:
         return np.arange(len(points))
     codes = _morton_codes(points)
     by_code = codes.argsort()
@@ -49,9 +48,9 @@ def thinned_points(points: Points, num_points: int) -> Indices:
     # Neighbours on the curve lie in the same cell of a grid halved b times if their codes share the first b bits.
     shared = 3 * _BITS - np.frexp((codes[1:] ^ codes[:-1]).astype(np.float64))[1]
     cells = 1 + np.cumsum(np.bincount(shared, minlength=3 * _BITS + 1)[: 3 * _BITS])  # of b = 1, 2, ...
-    if cells[-1] < enough:
+    if cells[-1] < fewest:
         return np.arange(len(points))
-    halvings = 1 + int(np.argmax(cells >= enough))
+    halvings = 1 + int(np.argmax(cells >= fewest))
     distinct = np.flatnonzero(np.concatenate([[True], shared < 3 * _BITS]))
     starts_cell = np.concatenate([[True], shared < halvings])[distinct]
     return np.sort(np.minimum.reduceat(by_code, distinct)[starts_cell])

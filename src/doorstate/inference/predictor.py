@@ -53,7 +53,8 @@ class Predictor(ABC):
             budget_ms: in place of `num_points`: evaluate as many points as this machine has time for, measured now
                 from a raw 640 x 480 cloud to a prediction, and never more than the weights were trained with.
             gate: rejects clouds in which too much is missing; None rejects nothing.
-            threads: processor threads of one call to an `.onnx` file; torch's are a setting of the process.
+            threads: processor threads of one call to onnxruntime; None: OMP_NUM_THREADS if it
+                is set, else one a processor, at most four. Torch's are a setting of the process.
 
         Raises:
             ConfigError: options that exclude each other, or no such rule, or an impossible number of points.

@@ -35,6 +35,9 @@ class WatchSettings(FrozenModel):
     budget_ms: float = Field(
         0.0, ge=0, description="In place of points: as many as this time allows; 0: no budget."
     )
+    threads: int = Field(
+        0, ge=0, description="Processor threads of one call to a network; 0: one a processor, at most 4."
+    )
     gate: bool = Field(True, description="Report clouds in which too much is missing as unknown.")
     axes: str = Field(
         "auto",
@@ -84,6 +87,7 @@ class WatchSettings(FrozenModel):
             num_points=self.points or None,
             budget_ms=self.budget_ms or None,
             gate=DEFAULT_GATE if self.gate else None,
+            threads=self.threads or None,
         )
         predictor.warm_up()
         return predictor

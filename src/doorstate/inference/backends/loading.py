@@ -16,7 +16,7 @@ def load_backend(name_or_path: str | Path, threads: int | None = None) -> Backen
 
     Args:
         name_or_path: name of packaged weights, or path of a file.
-        threads: processor threads of one call to an `.onnx` file.
+        threads: processor threads of one call to onnxruntime; None: `default_threads()`.
 
     Raises:
         WeightsError: no such weights, or they cannot be used.

@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from doorstate.clouds.normalization import centroids
 from doorstate.errors import WeightsError, missing_extra, summarize_exception
 from doorstate.inference.backends.base import Outputs
+from doorstate.inference.backends.threads import default_threads
 from doorstate.networks.card import CARD_KEY, WeightsCard
 from doorstate.networks.heads import head_columns
 from doorstate.types import PARTS, STATES, Points
@@ -26,8 +26,10 @@ class OnnxBackend:
 
     Args:
         path: file written by `export_onnx`.
-        threads: processor threads of one call; None takes OMP_NUM_THREADS from the environment, as torch does, and
-            all processors if it is not set.
+        threads: processor threads of one call; None: `default_threads()`.
+        spinning: let threads that wait for work keep their processors. On processors that nothing else uses, a call is
+            a little quicker; on busy ones it takes several times as long, since waiting threads take time from working
+            ones (docs/benchmarks/busy.md).
 
     Raises:
         MissingExtraError: onnxruntime is not installed.
@@ -36,8 +38,8 @@ class OnnxBackend:
 
     network = None
 
-    def __init__(self, path: Path, threads: int | None = None) -> None:
-        self._session = _open_session(path, _default_threads() if threads is None else threads)
+    def __init__(self, path: Path, threads: int | None = None, *, spinning: bool = False) -> None:
+        self._session = _open_session(path, threads or default_threads(), spinning)
         self.card = _read_card(path, self._session.get_modelmeta().custom_metadata_map)
         self.num_points = self.card.num_points
         self._heads = head_names(self.card)
@@ -54,7 +56,7 @@ def head_names(card: WeightsCard) -> tuple[str, ...]:
     return tuple(name for name in card.heads if name != PARTS)
 
 
-def _open_session(path: Path, threads: int) -> Any:
+def _open_session(path: Path, threads: int, spinning: bool) -> Any:
     try:
         import onnxruntime
     except ImportError as error:
@@ -64,6 +66,7 @@ def _open_session(path: Path, threads: int) -> Any:
     options = onnxruntime.SessionOptions()
     options.log_severity_level = _LOG_ERRORS_ONLY
     options.intra_op_num_threads = threads
+    options.add_session_config_entry("session.intra_op.allow_spinning", str(int(spinning)))
     try:
         return onnxruntime.InferenceSession(path, options, providers=["CPUExecutionProvider"])
     except Exception as error:  # onnxruntime's errors have no common class of their own
@@ -80,8 +83,3 @@ def _read_card(path: Path, metadata: Mapping[str, str]) -> WeightsCard:
     if card.states != STATES:
         raise WeightsError(f"made for states {card.states}", path=path)
     return card
-
-
-def _default_threads() -> int:
-    value = os.environ.get("OMP_NUM_THREADS", "")
-    return int(value) if value.isdecimal() else 0
