@@ -32,6 +32,7 @@ from tests.bag_writer import (
     text,
     write_bag,
 )
+from tests.io.test_rvl import encode
 
 ORGANIZED = np.random.default_rng(0).normal(2, 1, (6, 8, 3)).astype(np.float32)
 ORGANIZED[1, 2] = np.nan
@@ -191,6 +192,21 @@ def test_compressed_depth_of_integers_is_lossless(kind: str, tmp_path: Path) -> 
     np.testing.assert_allclose(read_one(path), depth_to_points(DEPTH_M, CAMERA), rtol=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("data", "image_format"),
+    [
+        (PNG_PARAMETERS + encode(DEPTH_MM), "16UC1; compressedDepth rvl"),
+        (PNG_PARAMETERS + png(DEPTH_MM), "16UC1; compressedDepth rvl"),  # some drivers name RVL and write PNG
+        (PNG_PARAMETERS + png(DEPTH_MM), "16UC1; compressedDepth"),
+        (png(DEPTH_MM), "16UC1; png compressed "),
+    ],
+)
+def test_other_forms_of_compressed_depth(data: bytes, image_format: str, tmp_path: Path) -> None:
+    message = compressed_image("/depth/image_raw/compressedDepth", data, image_format)
+    path = write_bag(tmp_path, "mcap", [message, INFO])
+    np.testing.assert_allclose(read_one(path), depth_to_points(DEPTH_M, CAMERA), rtol=1e-6)
+
+
 def test_compressed_depth_of_floats_is_inverse(tmp_path: Path) -> None:
     # As compressed_depth_image_transport packs it: a = q (q + 1), b = 1 - a / farthest, stored = a / depth + b.
     quant_a = 100.0 * 101.0
@@ -226,10 +242,10 @@ def test_several_usable_topics_are_listed(tmp_path: Path) -> None:
 
 
 def test_bags_without_readable_topics_are_errors(tmp_path: Path) -> None:
-    rvl = compressed_image("/depth/compressedDepth", b"", "16UC1; compressedDepth rvl")
-    path = write_bag(tmp_path, "mcap", [text("/chatter"), rvl])
+    zstd = compressed_image("/depth/compressedDepth", b"", "16UC1; compressedDepth zstd")
+    path = write_bag(tmp_path, "mcap", [text("/chatter"), zstd])
     assert (read_error(path).field, read_error(path).expected) == ("topic", None)
-    assert "rvl" in read_error(path, "/depth/compressedDepth").message
+    assert "zstd" in read_error(path, "/depth/compressedDepth").message
 
 
 @pytest.mark.parametrize(

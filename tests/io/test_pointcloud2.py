@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from doorstate.errors import CloudReadError
 from doorstate.io.pointcloud2 import points_from_pointcloud2
+from tests.hand_made_clouds import image_of_a_rough_wall
 
 DATATYPES = {"f4": 7, "f8": 8, "u1": 2}  # sensor_msgs/PointField
 
@@ -47,7 +48,7 @@ def messages(draw: st.DrawFn) -> tuple[dict[str, Any], NDArray[np.float64]]:
     for name in draw(st.permutations(["x", "y", "z", "ring"])):
         place += draw(st.integers(0, 5))
         kind = "u1" if name == "ring" else draw(st.sampled_from(["f4", "f8"]))
-        fields.append(Field(name, place, DATATYPES[kind]))
+        fields.append(Field(name, place, DATATYPES[kind], draw(st.sampled_from([1, 1, 0]))))  # 0: left out
         formats.append(order + kind)
         place += np.dtype(kind).itemsize
     point_step = place + draw(st.integers(0, 5))
@@ -124,7 +125,7 @@ def test_no_points_are_an_empty_cloud(extent: tuple[int, int]) -> None:
         ({"fields": []}, "has the fields none"),
         ({"fields": PACKED[:2]}, "has the fields x y"),
         ({"fields": [*PACKED[:2], Field("z", 8, 6)]}, "1 values of datatype 6 as z"),
-        ({"fields": [*PACKED[:2], Field("z", 8, 7, 0)]}, "0 values of datatype 7 as z"),
+        ({"fields": [*PACKED[:2], Field("z", 8, 7, 2)]}, "2 values of datatype 7 as z"),
         ({"fields": [Field("x", 0, 7, 3), *PACKED[1:]]}, "3 values of datatype 7 as x"),
         ({"fields": [*PACKED[:2], Field("z", 9, 7)]}, "z at byte 9 is not within 12 bytes"),
         ({"fields": [*PACKED[:2], Field("z", 8, 8)]}, "z at byte 8 is not within 12 bytes"),
@@ -146,3 +147,11 @@ def test_contradictory_messages_are_read_errors(wrong: dict[str, Any], reason: s
         points_from_pointcloud2(**MESSAGE | wrong)
     assert reason in str(caught.value)
     assert str(caught.value).isprintable()
+
+
+def test_shuffled_points_of_an_image_are_unorganized() -> None:
+    wall = image_of_a_rough_wall(60, 80)
+    message = MESSAGE | {"height": 60, "width": 80, "row_step": 960}
+    np.testing.assert_array_equal(points_from_pointcloud2(**message | {"data": wall.tobytes()}), wall)
+    shuffled = np.random.default_rng(0).permutation(wall.reshape(-1, 3))
+    np.testing.assert_array_equal(points_from_pointcloud2(**message | {"data": shuffled.tobytes()}), shuffled)

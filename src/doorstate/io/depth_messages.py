@@ -10,11 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from doorstate.errors import CloudReadError
+from doorstate.io.png import SIGNATURE as PNG_SIGNATURE
 from doorstate.io.png import parse_depth_png
 from doorstate.io.pointcloud2 import MessageBytes
+from doorstate.io.rvl import parse_rvl
 from doorstate.io.size_limits import check_point_count, check_size
 
 DEPTH_ENCODINGS = {"16UC1": "u2", "mono16": "u2", "32FC1": "f4"}
+_TRANSPORT = "compressedDepth"
 # compressed_depth_image_transport, compression_common.h: format, and the two parameters of inverse depth.
 _PARAMETERS = struct.Struct("<iff")
 
@@ -49,21 +52,26 @@ def pixels_from_image(
 
 
 def pixels_from_compressed_depth(image_format: str, data: MessageBytes) -> NDArray[Any]:
-    """Read a sensor_msgs/CompressedImage of the image transport `compressedDepth`, as PNG.
+    """Read a sensor_msgs/CompressedImage of depth, by the image transport `compressedDepth` or as a plain PNG.
 
     Args:
-        image_format: such as `16UC1; compressedDepth png`.
-        data: twelve bytes of parameters, then the PNG.
+        image_format: such as `16UC1; compressedDepth png`, `16UC1; compressedDepth rvl` or `16UC1; png compressed`.
+        data: of `compressedDepth`, twelve bytes of parameters before the PNG or RVL data.
 
     Returns:
-        (H, W) like `pixels_from_image`; for 32FC1 the PNG holds inverse depth, NaN where it is 0.
+        (H, W) like `pixels_from_image`; `compressedDepth` of 32FC1 holds inverse depth, NaN where it is 0.
 
     Raises:
         CloudReadError: another kind of image or compression, or damaged.
     """
     check_compressed_format(image_format)
     content = bytes(data)
-    stored = parse_depth_png(content[_PARAMETERS.size :])
+    if _TRANSPORT not in image_format:
+        return parse_depth_png(content)
+    packed = content[_PARAMETERS.size :]
+    # Some drivers name RVL and write PNG.
+    is_rvl = "rvl" in image_format.lower() and not packed.startswith(PNG_SIGNATURE)
+    stored = parse_rvl(packed) if is_rvl else parse_depth_png(packed)
     if DEPTH_ENCODINGS[_encoding(image_format)] == "u2":
         return stored
     _, quant_a, quant_b = _PARAMETERS.unpack_from(content)
@@ -90,10 +98,15 @@ def check_compressed_format(image_format: str) -> None:
     Raises:
         CloudReadError: they are not.
     """
-    if "compressedDepth" not in image_format:
-        raise CloudReadError(f"is an image compressed as {image_format!r}, not compressedDepth")
-    if "rvl" in image_format:
-        raise CloudReadError(f"is compressed as {image_format!r}", expected="PNG")
+    compression = image_format.partition(";")[2].lower()
+    if _TRANSPORT not in image_format:
+        if "png" not in compression or DEPTH_ENCODINGS.get(_encoding(image_format)) != "u2":
+            raise CloudReadError(
+                f"is an image compressed as {image_format!r}, not depth",
+                expected="compressedDepth, or PNG of 16 bit",
+            )
+    elif not set(compression.split()) <= {_TRANSPORT.lower(), "png", "rvl"}:
+        raise CloudReadError(f"is depth compressed as {image_format!r}", expected="PNG or RVL")
     check_encoding(_encoding(image_format))
 
 

@@ -16,7 +16,7 @@ from doorstate.io.size_limits import check_point_count
 
 # PNG specification, IHDR: the first chunk holds width, height, bit depth and colour type (0 is grey).
 _HEADER = struct.Struct(">8s4x4sIIBB")
-_SIGNATURE = b"\x89PNG\r\n\x1a\n"
+SIGNATURE = b"\x89PNG\r\n\x1a\n"
 # zlib's technical notes: deflate packs at most 1032 bytes into one.
 _MAX_EXPANSION = 1032
 
@@ -70,7 +70,7 @@ def _check(data: bytes) -> tuple[int, int]:
     if len(data) < _HEADER.size:
         raise CloudReadError("is not a PNG image")
     signature, chunk, width, height, bits, colour_type = _HEADER.unpack_from(data)
-    if signature != _SIGNATURE or chunk != b"IHDR":
+    if signature != SIGNATURE or chunk != b"IHDR":
         raise CloudReadError("is not a PNG image")
     if bits * width * height > 8 * _MAX_EXPANSION * len(data):
         raise CloudReadError(

@@ -10,6 +10,7 @@ from typing import Protocol, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from doorstate._organized import flatten_unless_image
 from doorstate.errors import CloudReadError
 from doorstate.io.size_limits import check_point_count, check_size
 from doorstate.types import Points
@@ -56,7 +57,7 @@ def points_from_pointcloud2(
 
     Returns:
         (height, width, 3) float32 in the unit and frame of the message (metres by ROS REP 103), NaN kept; (width, 3)
-        where there is one row, (0, 3) where there is no point.
+        where there is one row or the points have been shuffled, (0, 3) where there is no point.
 
     Raises:
         CloudReadError: x, y or z is missing or no float, or the message contradicts itself.
@@ -85,7 +86,7 @@ def points_from_pointcloud2(
         for axis, (offset, stored) in enumerate(places):
             dtype = np.dtype(stored).newbyteorder(">" if is_bigendian else "<")
             points[..., axis] = np.ndarray((height, width), dtype, content, offset, (row_step, point_step))
-    return points if height > 1 else points[0]
+    return flatten_unless_image(points) if height > 1 else points[0]
 
 
 def _place(axis: str, fields: Sequence[PointField], point_step: int) -> tuple[int, str]:
@@ -93,7 +94,10 @@ def _place(axis: str, fields: Sequence[PointField], point_step: int) -> tuple[in
     if field is None:
         names = " ".join(field.name for field in fields) or "none"
         raise CloudReadError(f"has the fields {names}", expected="x, y and z")
-    if field.datatype not in _FLOATS or field.count != 1:
+    if field.datatype not in _FLOATS or field.count not in (
+        0,
+        1,
+    ):  # 0 is what drivers write that leave it out
         raise CloudReadError(
             f"has {field.count} values of datatype {field.datatype} as {axis}",
             expected="one float32 (7) or float64 (8)",
