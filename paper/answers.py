@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from doorstate._documents import read_json
 from doorstate._files import write_text
 from doorstate._jobs import Progress
 from doorstate.inference.network_predictor import NetworkPredictor
@@ -19,7 +21,6 @@ from doorstate.io.depth import depth_to_points
 from doorstate.networks.answers import ANSWERS_FILE, AnswerCount
 from doorstate.simulation.frames import level, replay
 from doorstate.simulation.presets import PRESETS, draw_rows
-from doorstate.training.run_folder import read_json
 from doorstate.types import NO_DOOR, STATES, Points
 
 from . import paths
@@ -56,18 +57,13 @@ def write_answers(names: Iterable[str], count: int, progress: Progress) -> Path:
 
 def count_answers(predictor: Predictor, examples: Iterable[Example], progress: Progress) -> AnswerCount:
     """Count answers and right ones."""
-    results = []
-    for done, (state, cloud) in enumerate(examples, 1):
-        prediction = predictor(cloud)
-        results.append(
-            (prediction.state is not None, prediction.state is not None and prediction.state == state)
-        )
-        progress(done, done)
-    return AnswerCount(
-        frames=len(results),
-        answered=sum(answered for answered, _ in results),
-        right=sum(right for _, right in results),
-    )
+    frames = answered = right = 0
+    for frames, (state, cloud) in enumerate(examples, 1):
+        predicted = predictor(cloud).state
+        answered += predicted is not None
+        right += predicted == state
+        progress(frames, frames)
+    return AnswerCount(frames=frames, answered=answered, right=right)
 
 
 def gazebo_frames() -> Iterator[Example]:
@@ -101,8 +97,6 @@ def simulated_doors(presets: list[str], count: int) -> Iterator[Example]:
 
 def recorded_answers(weights: Path) -> AnswerCount | None:
     """Return the published counts on recorded frames with a door; None if these weights were not tested on them."""
-    import hashlib
-
     digest = hashlib.sha256(weights.read_bytes()).hexdigest()
     tested = read_json(paths.RESULTS / "real" / "experiment.json")["weights"]
     method = next((entry["experiment"] for entry in tested if digest.startswith(entry["sha256"])), None)

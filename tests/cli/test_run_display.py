@@ -43,8 +43,10 @@ def table_text(runs: list[RunSpec], jobs: int) -> str:
     return screen.file.getvalue()
 
 
-def minutes(text: str) -> list[int]:
-    return [int(number) for number in re.findall(r"(\d+)\s+min", text)]
+def minutes(text: str) -> list[float]:
+    units = {"s": 1 / 60, "min": 1, "h": 60}
+    found = re.findall(r"about\s+([\d.]+)\s+(s|min|h)\s+left", " ".join(text.split()))
+    return [round(float(number) * units[unit], 1) for number, unit in found]
 
 
 def test_table_shows_scores_progress_and_time_left(tmp_path: Path) -> None:
@@ -82,13 +84,20 @@ def test_without_a_terminal_finished_runs_are_counted(
     assert (err.count("\n"), minutes(err)) == (1, [6])
 
 
-def test_without_a_terminal_lines_are_repeated(
+def test_without_a_terminal_each_new_epoch_is_a_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(run_display, "_LINE_PERIOD_S", 0.01)
-    with live_runs([RunSpec("dgcnn", 0, started(tmp_path))], RECIPES, 512, 1):
+    monkeypatch.setattr(run_display, "_LOOK_PERIOD_S", 0.01)
+    run = started(tmp_path)
+    with live_runs([RunSpec("dgcnn", 3, run)], RECIPES, 512, 1):
+        time.sleep(0.1)
+        assert capsys.readouterr().err == "", "epochs of an earlier start are not repeated"
+        entries = [
+            {"epoch": n, "points": 256, "centres": 1, "train_loss": 0.5, "seconds": 30.0} for n in range(4)
+        ]
+        run.write_log(entries)
         time.sleep(0.1)
     lines = capsys.readouterr().err.splitlines()
-    assert len(lines) > 1
-    assert len(set(lines)) == 1
-    assert lines[0].startswith("0 of 1 ")
+    assert [line.partition(",")[0] for line in lines] == ["dgcnn", "dgcnn"]
+    assert ["3 of 10" in lines[0], "4 of 10" in lines[1]] == [True, True]
+    assert all("fold 3" in line and "0.500" in line and "\x1b" not in line for line in lines)

@@ -8,7 +8,9 @@ from pathlib import Path
 
 from doorstate._files import read_csv
 from doorstate.dataset.store import PreparedDataset
-from tests.cli.helpers import Run
+from doorstate.networks.weights import read_card
+from tests.cli.helpers import Run, check_error
+from tests.conftest import SMALL_POINTS
 
 SMALL = ("--epochs", 1, "--set", "batch_size=8", "--set", "precision=fp32")
 
@@ -26,6 +28,8 @@ def test_pipeline_from_simulation_to_report(run: Run, tmp_path: Path) -> None:
     code, out, err = run("report", runs)
     assert code == 0, err
     assert (runs / "report" / "report.html").is_file()
+    assert run("report", runs / "runs" / "pointnet2" / "fold0", "--out", tmp_path / "one")[0] == 0
+    assert (tmp_path / "one" / "report.html").is_file()
     assert run("report", clouds, "--out", tmp_path / "data-report")[0] == 0
     trained = runs / "runs" / "pointnet2" / "fold0" / "weights.safetensors"
     depth = sorted((simulated / "depth" / "open").glob("*.png"))[0]
@@ -37,14 +41,21 @@ def test_pipeline_from_simulation_to_report(run: Run, tmp_path: Path) -> None:
 
 def test_train_writes_one_run(run: Run, small_dataset: PreparedDataset, tmp_path: Path) -> None:
     folder = tmp_path / "run"
-    code, _, err = run(
-        *("train", "--network", "pointcnn", "--data", small_dataset.folder, "--out", folder),
-        *("--points", 128, "--fold", 1, *SMALL),
-    )
+    command = ("train", "--network", "POINTCNN", "--data", small_dataset.folder, "--out", folder, "--fold", 1)
+    code, out, err = run(*command, *SMALL, "--json")
     assert code == 0, err
+    assert err.count("\n") == 1, "one line for the one epoch"
     assert (folder / "weights.safetensors").is_file()
     metrics = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
     assert 0 <= metrics["test_macro_f1"] <= 1
+    assert json.loads(out) == metrics
+    assert read_card(folder / "weights.safetensors").num_points == SMALL_POINTS, "all points of the data"
+    code, _, err = run("report", folder)
+    assert code == 0, err
+    page = (folder / "report" / "report.html").read_text(encoding="utf-8")
+    assert "fold 1" in page
+    (folder / "predictions.csv").unlink()
+    check_error(run("report", folder), 1, str(folder))
 
 
 def test_protocol_all_trains_on_all_clouds(run: Run, small_dataset: PreparedDataset, tmp_path: Path) -> None:

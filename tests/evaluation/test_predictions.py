@@ -16,7 +16,7 @@ from pandas.testing import assert_frame_equal
 from doorstate.dataset.splits import read_splits
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import DoorstateError, RunError
-from doorstate.evaluation.predictions import is_comparison, load_results, save_results
+from doorstate.evaluation.predictions import has_results, load_results, save_results
 from tests.evaluation.conftest import MakeComparison
 
 
@@ -119,7 +119,7 @@ def test_published_form_holds_the_same_and_is_deterministic(
     save_results(results, published)
     names = ["experiment.json", "metrics.json", "predictions.csv.gz", "splits.csv.gz"]
     assert sorted(path.name for path in published.iterdir()) == names
-    assert is_comparison(published)
+    assert has_results(published)
     loaded = load_results(published)
     assert_frame_equal(loaded.predictions, results.predictions, check_exact=True)
     assert loaded.config == results.config

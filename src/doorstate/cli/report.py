@@ -15,33 +15,36 @@ def report(
     folders: Annotated[
         list[Path],
         typer.Argument(
-            metavar="FOLDER...", help="Comparisons of the same samples, or one prepared data set."
+            metavar="FOLDER...", help="Comparisons or runs of the same samples, or one prepared data set."
         ),
     ],
     out: Annotated[
         Path | None, typer.Option(help="Folder to write to. [default: report in the first FOLDER]")
     ] = None,
-    data: Annotated[Path | None, typer.Option(help="Data set of the comparisons, if it was moved.")] = None,
+    data: Annotated[
+        Path | None, typer.Option(help="Data set of the comparisons or runs, if it was moved.")
+    ] = None,
 ) -> None:
-    """Write a report of comparisons or of one data set.
+    """Write a report of comparisons, of one run, or of one data set.
 
-    The folder gets tables and figures; that of comparisons also a self-contained HTML page.
+    The folder gets tables and figures; that of comparisons and runs also a self-contained HTML page.
 
     \b
     Examples:
       doorstate report runs/one-fold
+      doorstate report runs/first
       doorstate report runs/paper runs/related --out reports/all
       doorstate report data/ogurob-4096 --out reports/data
     """
     from doorstate.cli.console import stdout
     from doorstate.cli.progress import working
     from doorstate.dataset.store import is_prepared
-    from doorstate.evaluation.predictions import is_comparison
+    from doorstate.evaluation.predictions import has_results
     from doorstate.evaluation.report import write_dataset_report, write_report
 
-    is_dataset = len(folders) == 1 and not is_comparison(folders[0])
+    is_dataset = len(folders) == 1 and not has_results(folders[0])
     if is_dataset and not is_prepared(folders[0]):
-        raise DatasetError("neither a comparison nor a prepared data set", path=folders[0])
+        raise DatasetError("no comparison, no run and no prepared data set", path=folders[0])
     target = out or folders[0] / "report"
     with working("Writing the report"):
         page = write_dataset_report(folders[0], target) if is_dataset else write_report(folders, target, data)

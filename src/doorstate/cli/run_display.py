@@ -13,12 +13,13 @@ from rich.table import Table
 from rich.text import Text
 
 from doorstate.cli.console import stderr
+from doorstate.cli.progress import duration
 
 if TYPE_CHECKING:
     from doorstate.training.comparison import RunSpec
     from doorstate.training.recipes import Recipe
 
-_LINE_PERIOD_S = 600.0  # of log lines, where standard error is not a terminal
+_LOOK_PERIOD_S = 1.0  # between looks into the folders of the runs, where standard error is not a terminal
 
 
 @contextmanager
@@ -27,19 +28,21 @@ def live_runs(
 ) -> Iterator[Callable[[int, int], None]]:
     """Show the progress of runs on standard error; yields `update(done, total)`.
 
-    A terminal gets a table that is refreshed once a second. Otherwise a line is printed for each finished run and
-    every ten minutes.
+    A terminal gets a table that is refreshed once a second. Otherwise a line is printed for each epoch and each
+    finished run.
     """
     display = RunDisplay(runs, recipes, num_points, jobs)
     if not stderr.is_terminal:
+        epochs = EpochLines(runs, recipes)
 
         def print_line(done: int, total: int) -> None:
-            stderr.print(f"{done} of {total} runs finished{display.time_left()}")
+            epochs.print(display.time_left)
+            if total > 1:
+                stderr.print(f"{done} of {total} runs finished{display.time_left()}")
 
-        with _repeated(
-            _LINE_PERIOD_S, lambda: print_line(sum(run.folder.finished for run in runs), len(runs))
-        ):
+        with _repeated(_LOOK_PERIOD_S, lambda: epochs.print(display.time_left)):
             yield print_line
+        epochs.print(display.time_left)
         return
     with Live(get_renderable=display.table, console=stderr, refresh_per_second=1):
         yield lambda done, total: None
@@ -61,6 +64,41 @@ def _repeated(period_s: float, action: Callable[[], None]) -> Iterator[None]:
     finally:
         stopped.set()
         thread.join()
+
+
+class EpochLines:
+    """Prints a line for each epoch that runs finish from now on.
+
+    Args:
+        runs: runs to follow.
+        recipes: recipe of each network.
+    """
+
+    def __init__(self, runs: Sequence[RunSpec], recipes: Mapping[str, Recipe]) -> None:
+        self._runs = [run for run in runs if run.method in recipes]
+        self._recipes = recipes
+        self._lock = threading.Lock()
+        self._printed = [len(run.folder.read_log()) for run in self._runs]
+
+    def print(self, time_left: Callable[[], str]) -> None:
+        """Print the epochs that were finished since the last call."""
+        with self._lock:
+            for number, run in enumerate(self._runs):
+                log = run.folder.read_log()
+                for entry in log[self._printed[number] :]:
+                    stderr.print(f"{self._line(run, entry)}{time_left()}")
+                self._printed[number] = len(log)
+
+    def _line(self, run: RunSpec, entry: Mapping[str, str]) -> str:
+        parts = [
+            f"{run.method}, fold {run.fold}: epoch {int(entry['epoch']) + 1} of {self._recipes[run.method].epochs}",
+            f"{float(entry['seconds']):.0f} s",
+        ]
+        if entry.get("train_loss"):
+            parts.append(f"loss {float(entry['train_loss']):.3f}")
+        if entry.get("val_macro_f1"):
+            parts.append(f"validation macro-F1 {float(entry['val_macro_f1']):.3f}")
+        return ", ".join(parts)
 
 
 class RunDisplay:
@@ -93,7 +131,7 @@ class RunDisplay:
         from doorstate.training.eta import eta_seconds
 
         seconds = eta_seconds(self._runs, self._recipes, self._num_points)
-        return f", about {seconds / self._jobs / 60:.0f} min left" if seconds else ""
+        return f", about {duration(seconds / self._jobs)} left" if seconds else ""
 
     def _cell(self, run: RunSpec) -> Text:
         if run.folder.finished:

@@ -37,10 +37,15 @@ def read_runs(folder: Path, methods: Iterable[str], folds: int) -> list[RunConte
         RunError: a file is damaged.
     """
     places = [(method, fold, run_of(folder, method, fold)) for method in methods for fold in range(folds)]
-    return [_read_run(run, method, fold) for method, fold, run in places if run.predictions.exists()]
+    return [read_run(run, method, fold) for method, fold, run in places if run.predictions.exists()]
 
 
-def _read_run(run: RunFolder, method: str, fold: int) -> RunContents:
+def read_run(run: RunFolder, method: str, fold: int) -> RunContents:
+    """Read one run that has predictions.
+
+    Raises:
+        RunError: a file is damaged.
+    """
     parts = [_with_head_outputs(_read_predictions(run.predictions), run.head_outputs).assign(role="test")]
     if run.validation.exists():
         parts.append(_read_predictions(run.validation).assign(role="val"))

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,23 +22,24 @@ from doorstate.evaluation.manifest import read_manifest
 from doorstate.evaluation.published import save_results
 from doorstate.evaluation.results import ComparisonConfig, Results, RunRecord, order_predictions
 from doorstate.rules.base import Detection
-from doorstate.training.run_folder import run_of
+from doorstate.training.run_folder import RunFolder, run_of
 
-__all__ = ["Results", "is_comparison", "join_results", "load_part", "load_results", "save_results"]
+__all__ = ["Results", "has_results", "join_results", "load_part", "load_results", "save_results"]
 
 _DATASETS = "datasets"  # beside published comparisons: manifests of their data sets
 
 
-def is_comparison(folder: Path) -> bool:
-    """Return True if a folder holds a comparison, as training leaves it or as published."""
-    return (folder / comparison_folder.COMPARISON).is_file() or _is_published(folder)
+def has_results(folder: Path) -> bool:
+    """Return True if a folder holds a comparison, as training leaves it or as published, or one run."""
+    return (folder / comparison_folder.COMPARISON).is_file() or _is_published(folder) or _is_run(folder)
 
 
 def load_results(folder: Path, dataset: Path | None = None, folds: int | None = None) -> Results:
     """Load and check the results of a comparison; runs without predictions are listed in `Results.missing`.
 
     Args:
-        folder: comparison folder with `runs/<method>/fold<k>/`, or the published form.
+        folder: comparison folder with `runs/<method>/fold<k>/`, the published form, or the folder of one run, which
+            becomes a comparison of one fold.
         dataset: data set folder, if it was moved.
         folds: number of first folds to read; all if not given.
 
@@ -46,6 +47,8 @@ def load_results(folder: Path, dataset: Path | None = None, folds: int | None = 
         RunError: no run is finished, a file is missing or damaged, a method tested a sample twice, or a state or a
             test set differs from the manifest of the data set or from the splits.
     """
+    if _is_run(folder):
+        return _load_run(folder, dataset)
     is_published = _is_published(folder)
     layout = published if is_published else comparison_folder
     config = _read_config(folder / (published.EXPERIMENT if is_published else comparison_folder.COMPARISON))
@@ -60,6 +63,10 @@ def load_results(folder: Path, dataset: Path | None = None, folds: int | None = 
 
 def _is_published(folder: Path) -> bool:
     return (folder / published.EXPERIMENT).is_file()
+
+
+def _is_run(folder: Path) -> bool:
+    return RunFolder(folder).config.is_file()
 
 
 def _read_config(path: Path) -> ComparisonConfig:
@@ -85,6 +92,56 @@ def _load_runs(
     contents = comparison_folder.read_runs(folder, config.methods, config.folds)
     if not contents:
         raise RunError("no run has predictions yet", path=folder, hint="train at least one network first")
+
+    def path_of(method: str, fold: int) -> Path:
+        return run_of(folder, method, fold).predictions
+
+    return _gather(contents, config, dataset_folder, splits, path_of)
+
+
+def _load_run(folder: Path, dataset: Path | None) -> Results:
+    """Load one run as a comparison of one fold."""
+    run = RunFolder(folder)
+    if not run.predictions.is_file():
+        raise RunError("the run has no predictions: it is not finished, or has no test samples", path=folder)
+    settings = read_json(run.config)
+    rule = settings.get("rule")
+    method, fold = rule or settings.get("network"), settings.get("fold")
+    if not isinstance(method, str) or not isinstance(fold, int):
+        raise RunError("names no network or rule, and no fold", path=run.config)
+    name = {"name": f"{folder.resolve().name}, fold {fold}"}
+    methods = {"networks": () if rule else (method,), "rules": (method,) if rule else ()}
+    defaults = {"num_points": 0, "seed": 0}  # of rules
+    try:
+        config = ComparisonConfig.model_validate(defaults | settings | name | methods | {"folds": 1})
+    except ValidationError as error:
+        raise RunError(first_validation_error(error), path=run.config) from error
+    splits = read_splits(_splits_of(folder))
+    if not 0 <= fold < len(splits):
+        raise RunError(f"there is no fold {fold} in its splits", path=folder)
+    return _gather(
+        [comparison_folder.read_run(run, method, 0)],
+        config,
+        dataset or _find_dataset(folder, config.dataset, False),
+        (splits[fold],),
+        lambda _, __: run.predictions,
+    )
+
+
+def _splits_of(run: Path) -> Path:
+    """Return the splits beside a run of its own, or those of its comparison."""
+    own = run / comparison_folder.SPLITS
+    return own if own.is_file() else run.resolve().parents[2] / comparison_folder.SPLITS
+
+
+def _gather(
+    contents: Sequence[comparison_folder.RunContents],
+    config: ComparisonConfig,
+    dataset_folder: Path,
+    splits: tuple[Mapping[str, Role], ...],
+    path_of: Callable[[str, int], Path],
+) -> Results:
+    """Join and check the contents of runs."""
     settings: dict[str, Mapping[str, Any]] = {}
     detections: dict[str, dict[str, tuple[Detection, ...]]] = {}
     for run in contents:
@@ -103,7 +160,7 @@ def _load_runs(
         tuple(run.record for run in contents),
         detections,
     )
-    check_predictions(results, lambda method, fold: run_of(folder, method, fold).predictions)
+    check_predictions(results, path_of)
     return results
 
 
