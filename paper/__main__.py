@@ -98,6 +98,17 @@ def weights(
 
 
 @app.command()
+def graphs(
+    names: Annotated[list[str] | None, typer.Argument(help="Packaged weights; all if not given.")] = None,
+) -> None:
+    """Write the ONNX graphs of packaged weights again, after a change of a network or of the exporter."""
+    from .weights import package_graphs
+
+    for path in package_graphs(names or ()):
+        print(f"{path}: {path.stat().st_size / 1e3:.0f} kB")
+
+
+@app.command()
 def check() -> None:
     """Compare pages, scores and pictures with what results/ gives; exit code 1 if something differs."""
     from .check import check as check_all

@@ -19,6 +19,8 @@ from doorstate.evaluation.calibration import calibrate, labels_and_probabilities
 from doorstate.evaluation.heads import head_rows
 from doorstate.evaluation.resolution import fewest_points, score_resolution
 from doorstate.evaluation.results import Results
+from doorstate.inference.export import write_weights_graph
+from doorstate.networks.packaged import packaged_networks, packaged_weights
 from doorstate.networks.weights import load_weights, save_weights
 from doorstate.training.calibration import abstain_threshold, at_temperature
 from doorstate.training.comparison import read_comparison
@@ -72,10 +74,16 @@ def package_weights(
         )
         path = (out or paths.PRETRAINED) / f"{prefix}{network_name}.safetensors"
         save_weights(path, network, card, half=True)
+        write_weights_graph(path)
         parameters = sum(parameter.numel() for parameter in network.parameters())
         write_text(path.with_suffix(".md"), model_card(path, card, parameters, Training.read(run), evidence))
         stored.append(path)
     return stored
+
+
+def package_graphs(names: Sequence[str] = ()) -> list[Path]:
+    """Write the ONNX graphs of packaged weights beside them; those of all if no names are given."""
+    return [write_weights_graph(packaged_weights(name)) for name in names or packaged_networks()]
 
 
 def recipe_evidence(network: str, trained_points: int) -> Evidence:

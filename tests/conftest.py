@@ -19,7 +19,8 @@ from doorstate.dataset.preparation import Preparation
 from doorstate.dataset.prepare import prepare_dataset
 from doorstate.dataset.store import PreparedDataset
 from doorstate.networks import create_network
-from doorstate.networks.weights import WeightsCard, save_weights
+from doorstate.networks.card import WeightsCard
+from doorstate.networks.weights import save_weights
 from doorstate.simulation.camera import DepthCamera
 from doorstate.simulation.frames import Frame, replay
 from doorstate.simulation.presets import PRESETS, draw_rows

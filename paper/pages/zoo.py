@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 from doorstate.networks import create_network, list_networks
 from doorstate.networks.card import WeightsCard
+from doorstate.networks.card_file import read_card
 from doorstate.networks.packaged import packaged_networks, packaged_weights
-from doorstate.networks.weights import read_card
 
 
 class PackagedFile(NamedTuple):

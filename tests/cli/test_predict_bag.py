@@ -14,7 +14,8 @@ import pytest
 pytest.importorskip("rosbags")
 
 from doorstate.networks import create_network
-from doorstate.networks.weights import WeightsCard, save_weights
+from doorstate.networks.card import WeightsCard
+from doorstate.networks.weights import save_weights
 from doorstate.types import STATES
 from tests.bag_writer import START_NS, Message, camera_info, cloud, image, write_bag
 from tests.cli.helpers import Run, check_error

@@ -19,7 +19,8 @@ from doorstate._files import read_csv
 from doorstate.dataset.store import DatasetDescription, open_dataset
 from doorstate.evaluation.predictions import load_results
 from doorstate.networks.card import WeightsCard
-from doorstate.networks.weights import load_weights, read_card
+from doorstate.networks.card_file import read_card
+from doorstate.networks.weights import load_weights
 from doorstate.simulation.manifest import flatten, unflatten
 from doorstate.simulation.presets import PRESETS, draw_rows
 from doorstate.training.comparison import read_comparison

@@ -12,7 +12,8 @@ from doorstate.inference.budget import wall_and_floor
 from doorstate.inference.gate import Gate
 from doorstate.inference.network_predictor import NetworkPredictor
 from doorstate.networks import create_network
-from doorstate.networks.weights import WeightsCard, save_weights
+from doorstate.networks.card import WeightsCard
+from doorstate.networks.weights import save_weights
 
 
 def clock_of(milliseconds: list[float]) -> Callable[[], float]:

@@ -21,10 +21,11 @@ from doorstate.inference.network_predictor import NetworkPredictor
 from doorstate.inference.rule_predictor import RulePredictor
 from doorstate.networks import create_network
 from doorstate.networks.base import PointNetwork
+from doorstate.networks.card import WeightsCard
 from doorstate.networks.head_layers import add_heads, head_outputs
 from doorstate.networks.heads import HEADS, head_columns
 from doorstate.networks.packaged import packaged_networks, packaged_weights
-from doorstate.networks.weights import WeightsCard, save_weights
+from doorstate.networks.weights import save_weights
 from doorstate.simulation.frames import replay
 from doorstate.simulation.manifest import unflatten
 from doorstate.types import STATES

@@ -23,7 +23,8 @@ from doorstate.inference.backends.threads import default_threads
 from doorstate.inference.network_predictor import NetworkPredictor
 from doorstate.inference.predictor import Predictor
 from doorstate.networks import create_network
-from doorstate.networks.weights import WeightsCard, save_weights
+from doorstate.networks.card import WeightsCard
+from doorstate.networks.weights import save_weights
 from doorstate.simulation.frames import replay
 from doorstate.simulation.manifest import unflatten
 from doorstate.types import Points

@@ -14,7 +14,8 @@ from doorstate.inference.network_predictor import NetworkPredictor
 from doorstate.inference.predictor import DEFAULT_NETWORK, Predictor
 from doorstate.inference.rule_predictor import RulePredictor
 from doorstate.networks import create_network
-from doorstate.networks.weights import WeightsCard, save_weights
+from doorstate.networks.card import WeightsCard
+from doorstate.networks.weights import save_weights
 
 
 def num_points_of(path: Path, **options: Any) -> int:

@@ -12,7 +12,9 @@ from safetensors.torch import save_file
 
 from doorstate.errors import WeightsError
 from doorstate.networks import create_network, list_networks
-from doorstate.networks.weights import WeightsCard, load_weights, read_card, save_weights
+from doorstate.networks.card import WeightsCard
+from doorstate.networks.card_file import read_card
+from doorstate.networks.weights import load_weights, save_weights
 
 
 @pytest.mark.parametrize("name", list_networks())

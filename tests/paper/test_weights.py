@@ -16,7 +16,7 @@ from doorstate.dataset.store import PreparedDataset
 from doorstate.evaluation.calibration import labels_and_probabilities
 from doorstate.evaluation.predictions import load_results
 from doorstate.inference.predictor import Predictor
-from doorstate.networks.weights import read_card
+from doorstate.networks.card_file import read_card
 from doorstate.training.calibration import at_temperature
 from doorstate.training.comparison import compare, prepare_comparison
 from doorstate.training.experiment import Experiment

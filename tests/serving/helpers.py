@@ -18,7 +18,7 @@ from doorstate.inference.backends.torch_backend import TorchBackend
 from doorstate.inference.network_predictor import NetworkPredictor
 from doorstate.inference.rule_predictor import RulePredictor
 from doorstate.networks import create_network
-from doorstate.networks.weights import WeightsCard
+from doorstate.networks.card import WeightsCard
 from doorstate.serving.app import create_app
 from doorstate.serving.server import KEEP_ALIVE_S
 from doorstate.serving.work_queue import Limits

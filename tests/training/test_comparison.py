@@ -18,7 +18,7 @@ from doorstate._files import read_csv
 from doorstate.dataset.splits import read_splits
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import ConfigError, RunError
-from doorstate.networks.weights import read_card
+from doorstate.networks.card_file import read_card
 from doorstate.training.comparison import compare, plan_runs, prepare_comparison
 from doorstate.training.experiment import Experiment
 from tests.training.runs import CHANGES, small_experiment

@@ -11,7 +11,7 @@ from doorstate.errors import CloudReadError
 from doorstate.inference.backends.torch_backend import TorchBackend
 from doorstate.inference.network_predictor import NetworkPredictor
 from doorstate.networks import create_network
-from doorstate.networks.weights import WeightsCard
+from doorstate.networks.card import WeightsCard
 from doorstate.simulation.frames import Frame
 from doorstate.types import STATES
 from doorstate.viewer.cloud_page import Entry, make_entry

@@ -84,6 +84,7 @@ class NetworkPredictor(Predictor):
         thin: bool = True,
         gate: Gate | None = DEFAULT_GATE,
         threads: int | None = None,
+        backend: str | None = None,
         clock: Callable[[], float] = time.perf_counter,
     ) -> NetworkPredictor:
         """Load packaged weights by name or a weights file by path; arguments as in `Predictor.load` and the class.
@@ -91,22 +92,22 @@ class NetworkPredictor(Predictor):
         Raises:
             ConfigError: both points and a budget, or a budget that is not above zero.
             WeightsError: no such weights, or they cannot be used.
-            MissingExtraError: torch or onnxruntime is needed and not installed.
+            MissingExtraError: torch is needed and not installed.
         """
         if budget_ms is not None and (num_points is not None or not budget_ms > 0):
             raise ConfigError(
                 f"a budget of {budget_ms} ms with {num_points} points: give one of them, above zero"
             )
-        backend = load_backend(name_or_path, threads)
+        loaded = load_backend(name_or_path, threads, backend)
 
         def with_points(count: int | None) -> NetworkPredictor:
-            return cls(backend, count, thin=thin, gate=gate, clock=clock)
+            return cls(loaded, count, thin=thin, gate=gate, clock=clock)
 
         if budget_ms is None:
             return with_points(num_points)
-        if backend.num_points is not None:
-            return with_points(backend.num_points)
-        return largest_within_budget(with_points, backend.card.num_points, budget_ms)
+        if loaded.num_points is not None:
+            return with_points(loaded.num_points)
+        return largest_within_budget(with_points, loaded.card.num_points, budget_ms)
 
     @property
     def name(self) -> str:

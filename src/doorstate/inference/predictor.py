@@ -42,12 +42,13 @@ class Predictor(ABC):
         budget_ms: float | None = None,
         gate: Gate | None = DEFAULT_GATE,
         threads: int | None = None,
+        backend: str | None = None,
     ) -> Predictor:
         """Load packaged weights by name, a weights file by path, or a rule by name.
 
         Args:
-            name_or_path: name of packaged weights (`packaged_networks()`), a `.safetensors` file, or an `.onnx` file
-                written by `export_onnx`, which needs no torch. None: `DEFAULT_NETWORK`.
+            name_or_path: name of packaged weights (`packaged_networks()`), an `.onnx` file written by `export_onnx`, or
+                a `.safetensors` file, which needs torch. None: `DEFAULT_NETWORK`.
             rule: name of a rule (`list_rules()`), in place of a network.
             num_points: points that the network evaluates; None takes the number recorded with the weights.
             budget_ms: in place of `num_points`: evaluate as many points as this machine has time for, measured now
@@ -55,11 +56,12 @@ class Predictor(ABC):
             gate: rejects clouds in which too much is missing; None rejects nothing.
             threads: processor threads of one call to onnxruntime; None: OMP_NUM_THREADS if it
                 is set, else one a processor, at most four. Torch's are a setting of the process.
+            backend: "onnxruntime" or "torch"; None: torch for a `.safetensors` file, else onnxruntime.
 
         Raises:
             ConfigError: options that exclude each other, or no such rule, or an impossible number of points.
             WeightsError: no such weights, or they cannot be used.
-            MissingExtraError: torch or onnxruntime is needed and not installed.
+            MissingExtraError: torch is needed and not installed.
         """
         # The subclasses import this module.
         if rule is not None:
@@ -78,6 +80,7 @@ class Predictor(ABC):
             budget_ms=budget_ms,
             gate=gate,
             threads=threads,
+            backend=backend,
         )
 
     @property

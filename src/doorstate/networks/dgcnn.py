@@ -75,7 +75,11 @@ class DGCNN(PointNetwork):
 
     def num_neighbours(self, num_points: int) -> int:
         """Return the number of neighbours per point in a cloud of `num_points`."""
-        return self.k or (20 if num_points < 2048 else 40)
+        if self.k is not None:
+            return self.k
+        if torch.compiler.is_exporting():  # one graph for both
+            return cast(int, torch.sym_min(40, 20 + num_points // 2048 * 20))  # type: ignore[no-untyped-call]
+        return 20 if num_points < 2048 else 40
 
     def neighbourhoods(self, points: Tensor) -> Neighbourhoods:
         """Return the (B, N) spatial order of the points, and (B, N, k) neighbours in that order."""

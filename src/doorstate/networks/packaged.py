@@ -26,3 +26,12 @@ def packaged_weights(name: str) -> Path:
     if not path.is_file():
         raise unknown_name("packaged weights", name, packaged_networks(), WeightsError)
     return path
+
+
+def packaged_graph(name: str) -> Path:
+    """Return the path of the ONNX graph that takes packaged weights.
+
+    Raises:
+        WeightsError: no packaged weights of this name.
+    """
+    return packaged_weights(name).with_suffix(".onnx")

@@ -12,7 +12,7 @@ from torch.nn import functional
 
 from doorstate.errors import unknown_name
 from doorstate.networks.base import Encoding, Neighbourhoods, PointNetwork
-from doorstate.networks.kernels.gather import gather_rows
+from doorstate.networks.kernels.gather import first_rows, gather_rows
 from doorstate.networks.kernels.knn import knn
 from doorstate.networks.layers.batch_norm import RowBatchNorm, set_batchnorm
 from doorstate.networks.layers.dense import Dense, classification_head, glorot
@@ -120,13 +120,14 @@ class Point2Sequence(PointNetwork):
         """Return one (B, M, 128): sorted neighbours of the centres; the areas are the first 16, 32, 64 and all 128."""
         largest = max(AREAS)
         # Deviation: with fewer than 128 * dilation points the dilation shrinks.
-        dilation = min(self.dilation, points.shape[1] // largest)
-        return (knn(points[:, : self.num_centres], points, largest * dilation)[..., ::dilation],)
+        count = points.shape[1]
+        dilation = self.dilation if count >= largest * self.dilation else count // largest
+        return (knn(first_rows(points, self.num_centres), points, largest * dilation)[..., ::dilation],)
 
     def sequence(self, points: Tensor, neighbours: Tensor) -> Tensor:
         """Return the (B, M, 4, 128) features of the areas, smallest first; neighbours are (B, M, 128)."""
         offsets = gather_rows(points, neighbours)  # (B, M, 128, 3)
-        offsets = offsets - points[:, : self.num_centres].unsqueeze(2)
+        offsets = offsets - first_rows(points, self.num_centres).unsqueeze(2)
         areas = [mlp(offsets[:, :, :size]) for size, mlp in zip(AREAS, self.mlps, strict=True)]  # (B, M, 128)
         return torch.stack(areas, dim=2)
 
@@ -147,5 +148,5 @@ class Point2Sequence(PointNetwork):
         memory, hidden = self.encode_decode(areas)  # (B, M, 4, 128), (B, M, 128)
         region = self.attention(memory, hidden) if self.region_feature == "attention" else hidden
         region = self.region(region)  # (B, M, 128)
-        centres = points[:, : self.num_centres]  # (B, M, 3)
+        centres = first_rows(points, self.num_centres)  # (B, M, 3)
         return Encoding(self.globals(centres, region))  # (B, 1024), the maximum over the centres

@@ -15,7 +15,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from doorstate.networks.base import Encoding, Neighbourhoods, PointNetwork
-from doorstate.networks.kernels.gather import gather_rows
+from doorstate.networks.kernels.gather import first_rows, gather_rows
 from doorstate.networks.kernels.knn import knn
 from doorstate.networks.kernels.precision import at_least_float32, full_precision
 from doorstate.networks.kernels.separable import separable
@@ -86,11 +86,16 @@ class XConv(nn.Module):
             )
             self.out_channels += quarter
 
+    def representatives(self, points: Tensor) -> Tensor:
+        """Return the (B, P, 3) representative points of (B, N, 3) points."""
+        return points if self.num_representatives is None else first_rows(points, self.num_representatives)
+
     def neighbours(self, points: Tensor) -> Tensor:
         """Return (B, P, K): every D-th of the nearest points of each representative, itself first."""
         # Deviation: with fewer than K * D points the dilation shrinks, so that K neighbours remain.
-        dilation = min(self.dilation, points.shape[1] // self.k)
-        representatives = points[:, : self.num_representatives]
+        count = points.shape[1]
+        dilation = self.dilation if count >= self.k * self.dilation else count // self.k
+        representatives = self.representatives(points)
         return knn(representatives, points, self.k * dilation)[..., ::dilation]
 
     def forward(self, points: Tensor, features: Tensor | None, indices: Tensor) -> tuple[Tensor, Tensor]:
@@ -102,7 +107,7 @@ class XConv(nn.Module):
             indices: (B, P, K) as `neighbours` returns them.
         """
         # Deviation: the first points in farthest-point order, not the first of a random permutation.
-        representatives = points[:, : self.num_representatives]  # (B, P, 3)
+        representatives = self.representatives(points)  # (B, P, 3)
         offsets = gather_rows(points, indices) - representatives.unsqueeze(2)  # (B, P, K, 3)
         rows = self.lift(offsets)  # (B, P, K, C_lift)
         if features is not None:
@@ -166,7 +171,7 @@ class PointCNN(PointNetwork):
         neighbours = []
         for level in self._convs():
             neighbours.append(level.neighbours(points))
-            points = points[:, : level.num_representatives]
+            points = level.representatives(points)
         return tuple(neighbours)
 
     def point_features(self, points: Tensor, neighbourhoods: Neighbourhoods | None = None) -> Tensor:

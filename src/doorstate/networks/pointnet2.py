@@ -15,7 +15,7 @@ from torch import Tensor, nn
 from doorstate.errors import unknown_name
 from doorstate.networks.base import Encoding, Neighbourhoods, PointNetwork
 from doorstate.networks.kernels.ball_query import ball_query
-from doorstate.networks.kernels.gather import gather_rows
+from doorstate.networks.kernels.gather import first_rows, gather_rows
 from doorstate.networks.kernels.knn import knn
 from doorstate.networks.kernels.precision import full_precision
 from doorstate.networks.layers.batch_norm import RowBatchNorm, set_batchnorm
@@ -69,13 +69,13 @@ class SetAbstraction(nn.Module):
 
     def neighbourhoods(self, points: Tensor) -> Neighbourhoods:
         """Return the (B, M, K) points in the balls around the centres, one tensor per scale."""
-        return tuple(ball_query(points[:, : self.num_centres], points, *ball) for ball in self.balls)
+        return tuple(ball_query(first_rows(points, self.num_centres), points, *ball) for ball in self.balls)
 
     def forward(
         self, points: Tensor, features: Tensor | None, neighbourhoods: Neighbourhoods
     ) -> tuple[Tensor, Tensor]:
         """Return (B, M, 3) centres and (B, M, out_channels) features of (B, N, 3) points and (B, N, F) features."""
-        centres = points[:, : self.num_centres]  # (B, M, 3)
+        centres = first_rows(points, self.num_centres)  # (B, M, 3)
         pooled = []
         for indices, mlp in zip(neighbourhoods, self.mlps, strict=True):
             offsets = gather_rows(points, indices) - centres.unsqueeze(2)  # (B, M, K, 3)
@@ -130,7 +130,7 @@ class PointNet2(PointNetwork):
 
     def neighbourhoods(self, points: Tensor) -> Neighbourhoods:
         """Return the balls of the first level's scales, then of the second's."""
-        centres = points[:, : self.level1.num_centres]
+        centres = first_rows(points, self.level1.num_centres)
         return self.level1.neighbourhoods(points) + self.level2.neighbourhoods(centres)
 
     def encode(self, points: Tensor, neighbourhoods: Neighbourhoods | None = None) -> Encoding:

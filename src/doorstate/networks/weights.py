@@ -10,13 +10,12 @@ from safetensors import SafetensorError, safe_open
 from safetensors.torch import save
 
 from doorstate._files import atomic_path
-from doorstate.clouds.normalization import SCALE_M
 from doorstate.errors import WeightsError
 from doorstate.networks import create_network
 from doorstate.networks.base import PointNetwork
 from doorstate.networks.card import CARD_KEY, WeightsCard
+from doorstate.networks.card_file import check_card, read_card
 from doorstate.networks.head_layers import add_heads
-from doorstate.types import STATES
 
 
 def save_weights(path: Path, network: PointNetwork, card: WeightsCard, half: bool = False) -> None:
@@ -29,24 +28,6 @@ def save_weights(path: Path, network: PointNetwork, card: WeightsCard, half: boo
         temporary.write_bytes(save(tensors, {CARD_KEY: card.model_dump_json()}))
 
 
-def read_card(path: Path) -> WeightsCard:
-    """Read the card of a weights file.
-
-    Raises:
-        WeightsError: the file is missing, damaged, or has no card.
-    """
-    if not path.is_file():
-        raise WeightsError("no such weights file", path=path)
-    try:
-        with safe_open(path, framework="pt") as weights:
-            metadata = weights.metadata() or {}
-        return WeightsCard.parse(metadata[CARD_KEY])
-    except (OSError, SafetensorError) as error:
-        raise WeightsError(f"cannot be read as safetensors ({error})", path=path) from error
-    except (KeyError, WeightsError) as error:
-        raise WeightsError("has no valid card: not a weights file of doorstate", path=path) from error
-
-
 def load_weights(path: Path) -> tuple[PointNetwork, WeightsCard]:
     """Build the network of a weights file, in evaluation mode and float32.
 
@@ -54,12 +35,13 @@ def load_weights(path: Path) -> tuple[PointNetwork, WeightsCard]:
         WeightsError: the file is missing, damaged, or for another network, other states or another scale.
     """
     card = read_card(path)
-    if card.states != STATES or card.scale_m != SCALE_M:
-        raise WeightsError(f"made for states {card.states} at scale {card.scale_m} m", path=path)
+    check_card(card, path)
     try:
         network = create_network(card.network, num_classes=len(card.states), **card.network_options)
         add_heads(network, card.heads)
         load_into(network, path)
+    except SafetensorError as error:
+        raise WeightsError(f"cannot be read as safetensors ({error})", path=path) from error
     except RuntimeError as error:
         reason = str(error).splitlines()[0]
         raise WeightsError(f"does not fit network {card.network}: {reason}", path=path) from error

@@ -19,9 +19,10 @@ from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import ConfigError, WeightsError
 from doorstate.networks import create_network
 from doorstate.networks.base import PointNetwork
+from doorstate.networks.card_file import read_card
 from doorstate.networks.head_layers import add_heads
 from doorstate.networks.heads import head_columns
-from doorstate.networks.weights import load_into, read_card, save_weights
+from doorstate.networks.weights import load_into, save_weights
 from doorstate.training.checkpoint import TrainingState
 from doorstate.training.config import RunConfig
 from doorstate.training.data import RunData

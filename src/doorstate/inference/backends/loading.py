@@ -5,30 +5,47 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from doorstate.errors import MissingExtraError, WeightsError
+from doorstate.errors import ConfigError, MissingExtraError, WeightsError, unknown_name
 from doorstate.inference.backends.base import Backend
 from doorstate.inference.backends.onnx_backend import OnnxBackend
-from doorstate.networks.packaged import packaged_weights
+from doorstate.networks.packaged import packaged_graph, packaged_weights
+
+BACKENDS = ("onnxruntime", "torch")
 
 
-def load_backend(name_or_path: str | Path, threads: int | None = None) -> Backend:
+def load_backend(name_or_path: str | Path, threads: int | None = None, backend: str | None = None) -> Backend:
     """Load packaged weights by name, or a `.safetensors` or `.onnx` file by path.
 
     Args:
         name_or_path: name of packaged weights, or path of a file.
         threads: processor threads of one call to onnxruntime; None: `default_threads()`.
+        backend: one of `BACKENDS`; None: torch for a `.safetensors` file, else onnxruntime.
 
     Raises:
+        ConfigError: the backend cannot run this kind of file.
         WeightsError: no such weights, or they cannot be used.
-        MissingExtraError: torch or onnxruntime is needed and not installed.
+        MissingExtraError: torch is needed and not installed.
     """
+    if backend not in (None, *BACKENDS):
+        raise unknown_name("backend", str(backend), BACKENDS, field="backend")
     path = Path(name_or_path)
     if path.suffix == ".onnx":
+        if backend == "torch":
+            raise ConfigError("torch cannot run an .onnx file", field="backend")
         return OnnxBackend(path, threads)
-    if path.suffix != ".safetensors":
-        if path.suffix or path.exists():
-            raise WeightsError("not a weights file", path=path, expected=".safetensors or .onnx")
-        path = packaged_weights(str(name_or_path))
+    if path.suffix == ".safetensors":
+        if backend == "onnxruntime":
+            raise ConfigError("onnxruntime needs an exported .onnx file", field="backend")
+        return _load_torch(path)
+    if path.suffix or path.exists():
+        raise WeightsError("not a weights file", path=path, expected=".safetensors or .onnx")
+    name = str(name_or_path)
+    if backend == "torch":
+        return _load_torch(packaged_weights(name))
+    return OnnxBackend(packaged_graph(name), threads, weights=packaged_weights(name))
+
+
+def _load_torch(path: Path) -> Backend:
     try:
         from doorstate.inference.backends.torch_backend import TorchBackend
         from doorstate.networks.weights import load_weights

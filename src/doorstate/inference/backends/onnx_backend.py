@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Exported network run by onnxruntime; torch is not needed."""
+"""Packaged or exported network run by onnxruntime; torch is not needed."""
 
 from __future__ import annotations
 
@@ -11,13 +11,16 @@ from doorstate.errors import WeightsError, missing_extra, summarize_exception
 from doorstate.inference.backends.base import Outputs
 from doorstate.inference.backends.threads import default_threads
 from doorstate.networks.card import CARD_KEY, WeightsCard
-from doorstate.networks.heads import head_columns
+from doorstate.networks.card_file import read_card
+from doorstate.networks.heads import POINT_HEADS, head_columns
+from doorstate.networks.tensor_file import read_tensors
 from doorstate.types import PARTS, STATES, Points
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
 INPUT, OUTPUT = "points", "probabilities"
+TENSOR_PREFIX = "weights."  # of names of tensors that a graph takes from a weights file
 _LOG_ERRORS_ONLY = 3
 
 
@@ -27,6 +30,8 @@ class OnnxBackend:
     Args:
         path: file written by `export_onnx`.
         threads: processor threads of one call; None: `default_threads()`.
+        weights: file with the card and the tensors of a graph without them (`write_weights_graph`), which takes any
+            number of points.
         spinning: let threads that wait for work keep their processors. On processors that nothing else uses, a call is
             a little quicker; on busy ones it takes several times as long, since waiting threads take time from working
             ones (docs/benchmarks/busy.md).
@@ -38,10 +43,15 @@ class OnnxBackend:
 
     network = None
 
-    def __init__(self, path: Path, threads: int | None = None, *, spinning: bool = False) -> None:
-        self._session = _open_session(path, threads or default_threads(), spinning)
-        self.card = _read_card(path, self._session.get_modelmeta().custom_metadata_map)
-        self.num_points = self.card.num_points
+    def __init__(
+        self, path: Path, threads: int | None = None, *, weights: Path | None = None, spinning: bool = False
+    ) -> None:
+        self._session = _open_session(path, threads or default_threads(), weights, spinning)
+        if weights is None:
+            self.card = _read_card(path, self._session.get_modelmeta().custom_metadata_map)
+            self.num_points: int | None = self.card.num_points
+        else:
+            self.card, self.num_points = read_card(weights), None
         self._heads = head_names(self.card)
 
     def __call__(self, points: Points) -> Outputs:
@@ -56,7 +66,13 @@ def head_names(card: WeightsCard) -> tuple[str, ...]:
     return tuple(name for name in card.heads if name != PARTS)
 
 
-def _open_session(path: Path, threads: int, spinning: bool) -> Any:
+def is_in_graph(name: str) -> bool:
+    """Return True for tensors of a weights file that a graph for whole clouds takes, from its name."""
+    of_point_head = name.startswith(tuple(f"heads.{head}." for head in POINT_HEADS))
+    return not of_point_head and not name.endswith(".num_batches_tracked")
+
+
+def _open_session(path: Path, threads: int, weights: Path | None, spinning: bool) -> Any:
     try:
         import onnxruntime
     except ImportError as error:
@@ -67,6 +83,14 @@ def _open_session(path: Path, threads: int, spinning: bool) -> Any:
     options.log_severity_level = _LOG_ERRORS_ONLY
     options.intra_op_num_threads = threads
     options.add_session_config_entry("session.intra_op.allow_spinning", str(int(spinning)))
+    if weights is not None:
+        # By value: onnxruntime would refuse a file that an installer has linked from elsewhere.
+        tensors = {
+            TENSOR_PREFIX + name: onnxruntime.OrtValue.ortvalue_from_numpy(tensor)
+            for name, tensor in read_tensors(weights).items()
+            if is_in_graph(name)
+        }
+        options.add_external_initializers(list(tensors), list(tensors.values()))
     try:
         return onnxruntime.InferenceSession(path, options, providers=["CPUExecutionProvider"])
     except Exception as error:  # onnxruntime's errors have no common class of their own

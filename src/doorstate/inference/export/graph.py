@@ -18,6 +18,7 @@ from doorstate.networks.heads import STATE
 if TYPE_CHECKING:
     from onnx import ModelProto
 
+_EXAMPLE_POINTS = 700
 _NO_SIZE_LIMIT = 2**30  # of a constant that the optimizer may fold
 
 
@@ -42,25 +43,56 @@ def build_graph(network: PointNetwork, card: WeightsCard, num_points: int, opset
     Raises:
         ValueError: the exporter cannot write this opset. Its own errors are of any type.
     """
-    import onnxscript.optimizer
-
-    # Two clouds, because torch.export takes a size of one for a constant.
-    example = torch.linspace(-1, 1, 2 * num_points * 3).view(2, num_points, 3)
-    program = torch.onnx.export(
-        _MetresToProbabilities(network.eval(), card),
-        (example,),
-        dynamo=True,
-        opset_version=opset,
-        dynamic_shapes=({0: torch.export.Dim("batch")},),
-        input_names=[INPUT],
-        output_names=[OUTPUT, *head_names(card)],
-        verbose=False,
-    )
-    assert program is not None  # with `dynamo`
     # Folds batch normalisation into weights once instead of at every start, and the quantizer finds matrices.
-    model: ModelProto = onnxscript.optimizer.optimize(
-        program.model_proto, input_size_limit=_NO_SIZE_LIMIT, output_size_limit=_NO_SIZE_LIMIT
-    )
+    return fold_constants(trace(network, card, num_points, opset))
+
+
+def trace(network: PointNetwork, card: WeightsCard, num_points: int | None, opset: int) -> ModelProto:
+    """Return the graph as torch writes it, with every tensor of the network in its initializers.
+
+    Args:
+        network: classifier.
+        card: card of its weights.
+        num_points: points per cloud; None: any number from the network's `min_points`.
+        opset: version of ONNX's operators.
+
+    Raises:
+        ValueError: the exporter cannot write this opset. Its own errors are of any type.
+    """
+    # Two clouds, because torch.export takes a size of one for a constant; more points than any network has centres.
+    example = torch.linspace(-1, 1, 2 * (num_points or _EXAMPLE_POINTS) * 3).view(2, -1, 3)
+    sizes: dict[int, object] = {0: torch.export.Dim("batch")}
+    if num_points is None:
+        sizes[1] = torch.export.Dim(INPUT, min=network.min_points)
+    with torch.no_grad():
+        program = torch.export.export(
+            _MetresToProbabilities(network.eval(), card),
+            (example,),
+            dynamic_shapes=(sizes,),
+            # Sizes are compared to see how torch lays out memory, which a graph does not know.
+            prefer_deferred_runtime_asserts_over_guards=True,
+        )
+        exported = torch.onnx.export(
+            program,
+            dynamo=True,
+            opset_version=opset,
+            input_names=[INPUT],
+            output_names=[OUTPUT, *head_names(card)],
+            optimize=False,
+            verbose=False,
+        )
+    assert exported is not None  # with `dynamo`
+    model: ModelProto = exported.model_proto
     if model.opset_import[0].version != opset:
         raise ValueError(f"the exporter writes opset {model.opset_import[0].version}")
     return model
+
+
+def fold_constants(model: ModelProto) -> ModelProto:
+    """Return the graph with everything computed that depends on initializers and constants alone."""
+    import onnxscript.optimizer
+
+    folded: ModelProto = onnxscript.optimizer.optimize(
+        model, input_size_limit=_NO_SIZE_LIMIT, output_size_limit=_NO_SIZE_LIMIT
+    )
+    return folded

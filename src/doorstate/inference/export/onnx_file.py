@@ -3,55 +3,22 @@
 
 from __future__ import annotations
 
-import logging
-import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from doorstate import __version__
 from doorstate._files import atomic_path
 from doorstate._jobs import Progress, no_progress
-from doorstate.clouds.normalization import SCALE_M
-from doorstate.errors import ExportError, missing_extra, summarize_exception
+from doorstate.errors import ExportError, summarize_exception
+from doorstate.inference.export.description import describe
 from doorstate.inference.export.graph import build_graph
+from doorstate.inference.export.packages import OPSET, check_export_packages, without_warnings
 from doorstate.inference.export.parity import Parity, compare_with_torch
 from doorstate.inference.reference_clouds import LabelledClouds
 from doorstate.networks.base import PointNetwork
-from doorstate.networks.card import CARD_KEY, WeightsCard
-from doorstate.networks.heads import HEADS
-from doorstate.types import STATES
+from doorstate.networks.card import WeightsCard
 
 if TYPE_CHECKING:
     from onnx import ModelProto
-
-OPSET = 18  # torch's exporter writes it; newer ones are converted from it
-_PACKAGES = ("onnx", "onnxscript", "onnxruntime")  # torch's exporter needs the second
-_DESCRIPTION = {
-    "frame": "x forward, y left, z up, origin at the camera, gravity-aligned (ROS REP 103)",
-    "units": "metres",
-    "preparation": (
-        "drop points that are not finite or (0, 0, 0), then keep as many as the input takes in farthest-point order; "
-        f"centring and division by {SCALE_M} m are in the graph"
-    ),
-    "labels": ",".join(STATES),
-    "heads": "; ".join(f"{head.name}: {head.description}" for head in HEADS.values()),
-}
-
-
-def check_export_packages() -> None:
-    """Check that the packages for an export are installed.
-
-    Raises:
-        MissingExtraError: one of them is not.
-    """
-    try:
-        for package in _PACKAGES:
-            import_module(package)
-    except ImportError as error:
-        raise missing_extra("export", *_PACKAGES) from error
 
 
 def export_onnx(
@@ -85,11 +52,11 @@ def export_onnx(
     num_points = clouds.points.shape[1]
     with atomic_path(path) as temporary:
         try:
-            with _without_warnings():
+            with without_warnings():
                 model = build_graph(network, card, num_points, opset)
                 if int8:
                     model = _quantize_linear_layers(model, temporary)
-                _describe(model, card, num_points)
+                describe(model, card.model_copy(update={"num_points": num_points, "default_points": None}))
                 onnx.checker.check_model(model, full_check=True)
         except Exception as error:  # the exporter and the quantizer raise errors of any type
             raise ExportError(
@@ -119,24 +86,3 @@ def _quantize_linear_layers(model: ModelProto, path: Path) -> ModelProto:
     onnx.save(model, path)
     quantize_dynamic(path, path, weight_type=QuantType.QInt8)
     return onnx.load(path)
-
-
-def _describe(model: ModelProto, card: WeightsCard, num_points: int) -> None:
-    import onnx
-
-    exported = card.model_copy(update={"num_points": num_points, "default_points": None})
-    onnx.helper.set_model_props(model, _DESCRIPTION | {CARD_KEY: exported.model_dump_json()})
-    model.producer_name, model.producer_version = "doorstate", __version__
-
-
-@contextmanager
-def _without_warnings() -> Iterator[None]:
-    """Suppress warnings of torch's exporter and of the quantizer about their own internals and optional packages."""
-    previous = logging.root.manager.disable
-    logging.disable(logging.WARNING)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            yield
-    finally:
-        logging.disable(previous)

@@ -63,7 +63,7 @@ def _first_hits(centres: Tensor, points: Tensor, radius: float, num_samples: int
 def _first_hits_of_all(centres: Tensor, points: Tensor, radius: float, num_samples: int) -> Tensor:
     """Compute `ball_query` as one graph, whose shapes do not depend on the points."""
     num_points = points.shape[1]
-    k = min(num_samples, num_points)
+    k = num_samples if num_points >= num_samples else num_points
     hits = coordinate_distances(centres, points) < radius**2
     index = torch.where(hits, torch.arange(num_points, device=points.device), num_points)
     index = index.topk(k, largest=False).values  # (B, M, k), num_points where there are no more

@@ -21,6 +21,15 @@ def gather_rows(values: Tensor, indices: Tensor) -> Tensor:
     return values.flatten(0, 1).index_select(0, rows).view(*indices.shape, values.shape[-1])
 
 
+def first_rows(values: Tensor, count: int) -> Tensor:
+    """Return the first `count` rows of each cloud, (B, min(count, N), C) of (B, N, C); all if there are fewer."""
+    if torch.compiler.is_exporting():
+        # A slice would limit the graph to clouds of more than `count` points, or of fewer.
+        number = torch.sym_min(count, values.shape[1])  # type: ignore[no-untyped-call]
+        return values.index_select(1, torch.arange(number, device=values.device))
+    return values[:, :count]
+
+
 def flat_rows(values: Tensor, indices: Tensor) -> Tensor:
     """Return (B, ...) row numbers in the flattened batch, for (B, ...) indices within each cloud."""
     batch, num_rows, _ = values.shape

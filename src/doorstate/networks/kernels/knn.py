@@ -35,7 +35,7 @@ def knn(query: Tensor, points: Tensor, k: int, *, in_order: bool = False) -> Ten
     Returns:
         (B, M, min(k, N)) int64 indices into points.
     """
-    k = min(k, points.shape[1])
+    k = k if points.shape[1] >= k else points.shape[1]  # `min` would be an operation of an exported graph
     with full_precision(points):
         query, points = at_least_float32(query.detach()), at_least_float32(points.detach())
         if not _blocks_are_faster(query, points, k):
@@ -50,11 +50,11 @@ def knn(query: Tensor, points: Tensor, k: int, *, in_order: bool = False) -> Ten
 
 def _blocks_are_faster(query: Tensor, points: Tensor, k: int) -> bool:
     return (
-        points.dtype == torch.float32
+        not torch.compiler.is_exporting()  # how many distances are needed depends on the points
+        and points.dtype == torch.float32
         and points.shape[1] >= max(_FEWEST_POINTS, 8 * k)
         and query.shape == points.shape
         and block_size(points.shape[1]) in BLOCK_SIZES
-        and not torch.compiler.is_exporting()  # how many distances are needed depends on the points
     )
 
 
