@@ -100,7 +100,9 @@ def _read_header(stream: BinaryIO, path: Path) -> TensorHeader:
         raise WeightsError(
             f"cannot be read as safetensors ({first_validation_error(error)})", path=path
         ) from error
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+    except WeightsError as error:  # no JSON
+        raise error.located(path) from error
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise WeightsError("cannot be read as safetensors (its header)", path=path) from error
     return TensorHeader(metadata, places)
 
