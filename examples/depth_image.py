@@ -16,7 +16,7 @@ import numpy as np
 from PIL import Image
 
 from doorstate import Predictor
-from doorstate.io.camera import read_intrinsics
+from doorstate.io.camera_files import read_intrinsics
 from doorstate.io.depth import depth_to_points
 
 

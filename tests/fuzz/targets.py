@@ -21,7 +21,8 @@ from doorstate.clouds.preparation import MIN_POINTS, CloudSpec, prepare_cloud
 from doorstate.errors import DoorstateError
 from doorstate.io.bags import open_bag
 from doorstate.io.body_frame import points_from_depth
-from doorstate.io.camera import Pinhole, read_intrinsics
+from doorstate.io.camera import Pinhole
+from doorstate.io.camera_files import read_intrinsics
 from doorstate.io.formats import BAG_SUFFIXES, CLOUD_SUFFIXES
 from doorstate.io.messages import cloud_from_message
 from doorstate.io.options import ReadOptions

@@ -99,7 +99,7 @@ def image_message(pixels: NDArray[Any], encoding: str) -> SimpleNamespace:
 def camera_message(fx: float) -> SimpleNamespace:
     """Return the camera of every fourth row and column of a 640 x 480 image, in pixels of the whole one."""
     k = [fx / STEP, 0, 319.5 / STEP, 0, fx / STEP, 239.5 / STEP, 0, 0, 1]
-    return SimpleNamespace(width=640 // STEP, height=480 // STEP, k=k, p=[0.0] * 12)
+    return SimpleNamespace(width=640 // STEP, height=480 // STEP, k=k, p=[0.0] * 12, d=[])
 
 
 def to_optical(points: Points) -> Points:

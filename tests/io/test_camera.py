@@ -12,7 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from doorstate.errors import CameraError
-from doorstate.io.camera import Intrinsics, Pinhole, pinhole_from_numbers, read_intrinsics
+from doorstate.io.camera import Intrinsics, Pinhole, pinhole_from_numbers
+from doorstate.io.camera_files import read_intrinsics
 from doorstate.io.depth import depth_to_points
 
 CAMERA = Intrinsics(640, 480, 617.25, 617.5, 317.25, 245.75)
@@ -73,8 +74,8 @@ BAD_FILES = {
     "broken.json": ('{"width": 640,', "not a JSON"),
     "unsafe.yaml": ("!!python/object/apply:os.getcwd []", "not a JSON"),
     "half.json": ('{"width": 640, "height": 480, "fx": 600}', "lacks fy, cx, cy"),
-    "short.json": ('{"width": 640, "height": 480, "K": [1, 2, 3, 4]}', "nine numbers"),
-    "words.json": ('{"width": "wide", "height": 480, "fx": 1, "fy": 1, "cx": 1, "cy": 1}', "not a JSON"),
+    "short.json": ('{"width": 640, "height": 480, "K": [1, 2, 3, 4]}', "4 numbers"),
+    "words.json": ('{"width": "wide", "height": 480, "fx": 1, "fy": 1, "cx": 1, "cy": 1}', "not a number"),
     "half_pixel.json": (
         '{"width": 640.5, "height": 480, "fx": 1, "fy": 1, "cx": 1, "cy": 1}',
         "whole pixels",

@@ -6,6 +6,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Iterable, Sequence
+from functools import partial
 from typing import Any
 
 import rclpy
@@ -70,7 +71,9 @@ class DoorNode:
         # Only the newest message waits while another is processed.
         newest = QoSProfile(depth=1, reliability=policy)
         if settings.input != "cloud":
-            node.create_subscription(CameraInfo, "camera_info", self._watch.set_camera, newest)
+            topic = node.resolve_topic_name(settings.input)
+            set_camera = partial(self._watch.set_camera, image_topic=topic)
+            node.create_subscription(CameraInfo, "camera_info", set_camera, newest)
         message_type = INPUTS[settings.input]
         subscription = node.create_subscription(message_type, settings.input, self._on_message, newest)
         self._publish(self._watch.report_silence(self._now_ns()), DiagnosticStatus.STALE)

@@ -44,7 +44,19 @@ def read_options(
     units: Annotated[str, typer.Option(help="Length unit of cloud files: m, dm, cm, mm or km.")] = "m",
     depth_scale: Annotated[float, typer.Option(help="Metres per unit of depth images.")] = 0.001,
     intrinsics: Annotated[
-        Path | None, typer.Option(help="Camera of depth images: a JSON file, or a ROS camera_info YAML file.")
+        Path | None,
+        typer.Option(
+            help="Camera of depth images: a file of ROS (camera_info), OpenCV, Kalibr, RealSense or Open3D."
+        ),
+    ] = None,
+    rectified: Annotated[
+        bool | None,
+        typer.Option(
+            "--rectified/--unrectified",
+            help="Depth images are rectified, or show the distortion of the lens."
+            " [default: by the name of the topic, else rectified if the camera has a projection matrix]",
+            show_default=False,
+        ),
     ] = None,
     fx: Annotated[
         float | None, typer.Option(help="Horizontal focal length in pixels, instead of --intrinsics.")
@@ -58,11 +70,12 @@ def read_options(
     Raises:
         ConfigError: an option has no such value, or options exclude each other.
     """
-    from doorstate.io.camera import pinhole_from_numbers, read_intrinsics
+    from doorstate.io.camera import pinhole_from_numbers
+    from doorstate.io.camera_files import read_intrinsics
     from doorstate.io.options import ReadOptions, metres_per_unit
     from doorstate.io.rotations import parse_quaternion
 
-    camera = None if intrinsics is None else read_intrinsics(intrinsics)
+    camera = None if intrinsics is None else read_intrinsics(intrinsics, rectified)
     try:
         pinhole = pinhole_from_numbers(fx, fy, cx, cy)
         if camera is not None and pinhole is not None:
@@ -74,6 +87,7 @@ def read_options(
             quaternion=None if quaternion is None else parse_quaternion(quaternion),
             ignore_viewpoint=ignore_viewpoint,
             intrinsics=camera or pinhole,
+            rectified=rectified,
             depth_scale_m=depth_scale,
             units_m=metres_per_unit(units),
         )
@@ -118,5 +132,5 @@ def check_layout(layout: str | None, options: ReadOptions) -> None:
     """
     from doorstate.io.options import DEFAULT_OPTIONS
 
-    if layout is not None and replace(options, intrinsics=None) != DEFAULT_OPTIONS:
+    if layout is not None and replace(options, intrinsics=None, rectified=None) != DEFAULT_OPTIONS:
         raise ConfigError("--layout has its own axes, units and depth scale: give only the camera")

@@ -76,7 +76,9 @@ def _options(row: Mapping[str, str], options: ReadOptions, index: Path, number: 
             options = replace(options, intrinsics=Pinhole(*intrinsics))
         else:
             # With a size, images of another size are refused.
-            options = replace(options, intrinsics=Intrinsics(round(width), round(height), *intrinsics))
+            options = replace(
+                options, intrinsics=Intrinsics(round(width), round(height), *Pinhole(*intrinsics))
+            )
     changes: dict[str, Any] = {}
     for column, field in _NUMBERS.items():
         if (number_of_column := value(column)) is not None:

@@ -18,8 +18,9 @@ from doorstate.inference.predictor import Predictor
 from doorstate.inference.state_filter import StateFilter
 from doorstate.inference.waiting import HoldTimer
 from doorstate.inference.watch_settings import MESSAGE_TYPES, WatchSettings
+from doorstate.io.calibration import calibration_from_message, is_rectified
 from doorstate.io.camera import Intrinsics
-from doorstate.io.messages import CLOUD, cloud_from_message, intrinsics_from_message, stamp_ns_of
+from doorstate.io.messages import CLOUD, cloud_from_message, stamp_ns_of
 from doorstate.io.options import DEFAULT_OPTIONS
 from doorstate.io.sensor_pose import PosedCloud, SensorPose
 from doorstate.rules.base import Detection
@@ -68,12 +69,19 @@ class DoorWatch:
         self._due_s = max(self._due_s, now_s - period_s) + period_s
         return True
 
-    def set_camera(self, info: Any) -> None:
-        """Use a CameraInfo for the images that come from now on."""
+    def set_camera(self, info: Any, image_topic: str = "") -> None:
+        """Use a CameraInfo for the images that come from now on; one that is not good does not replace a good one.
+
+        Args:
+            info: CameraInfo message.
+            image_topic: name of the topic of the images, which tells if they are rectified.
+        """
+        rectified = is_rectified(image_topic) if self._options.rectified is None else self._options.rectified
         try:
-            self._camera = intrinsics_from_message(info)
+            self._camera = calibration_from_message(info).camera(rectified)
         except CameraError as error:
-            self._camera = error
+            if isinstance(self._camera, CameraError):
+                self._camera = error
 
     def process(self, message: Any, received_ns: int) -> DoorReport:
         """Return the report after a message; one that cannot be read is unknown, with the reason.

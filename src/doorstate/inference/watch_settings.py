@@ -51,6 +51,9 @@ class WatchSettings(FrozenModel):
         description="In place of roll and pitch: x, y, z, w of the rotation from the frame of the messages to a level"
         " frame, as tf2_echo prints; empty: none.",
     )
+    rectified: Literal["auto", "yes", "no"] = Field(
+        "auto", description="Images are rectified; auto: as the name of their topic tells, rect or raw."
+    )
     units: Literal["m", "mm"] = Field("m", description="Unit of clouds and of floating point depth.")
     depth_scale: float = Field(0.001, gt=0, description="Metres per unit of integer depth.")
     reliable: bool = Field(
@@ -71,6 +74,7 @@ class WatchSettings(FrozenModel):
             roll_deg=self.roll,
             pitch_deg=self.pitch,
             quaternion=parse_quaternion(self.quaternion) if self.quaternion else None,
+            rectified={"auto": None, "yes": True, "no": False}[self.rectified],
             depth_scale_m=self.depth_scale,
             units_m=UNITS_M[self.units],
         )

@@ -22,6 +22,7 @@ from doorstate.io.bag_limits import (
     limited_sqlite,
     unpack_zstd,
 )
+from doorstate.io.calibration import COMPRESSED_DEPTH, calibration_from_message, is_rectified
 from doorstate.io.camera import Intrinsics
 from doorstate.io.depth_messages import check_compressed_format, check_encoding
 from doorstate.io.formats import BAG_SUFFIXES
@@ -31,14 +32,12 @@ from doorstate.io.messages import (
     COMPRESSED_IMAGE,
     IMAGE,
     cloud_from_message,
-    intrinsics_from_message,
     stamp_ns_of,
 )
 from doorstate.io.options import DEFAULT_OPTIONS, ReadOptions
 from doorstate.io.sensor_pose import PosedCloud, SensorPose
 from doorstate.types import Points
 
-_COMPRESSED_DEPTH = "/compressedDepth"  # suffix of topic names by image_transport
 _ZSTD = b"\x28\xb5\x2f\xfd"  # RFC 8878, 3.1.1
 
 
@@ -218,11 +217,13 @@ class Bag:
         self, topic: BagTopic, options: ReadOptions, camera_info_topic: str | None
     ) -> Callable[[Any], PosedCloud]:
         if topic.type != CLOUD and (camera_info_topic is not None or options.intrinsics is None):
-            camera = self._camera(camera_info_topic or _camera_info_beside(topic.name))
+            rectified = is_rectified(topic.name) if options.rectified is None else options.rectified
+            camera = self._camera(camera_info_topic or _camera_info_beside(topic.name), rectified)
             options = replace(options, intrinsics=camera)
         return lambda message: cloud_from_message(message, topic.type, options)
 
-    def _camera(self, name: str) -> Intrinsics:
+    def _camera(self, name: str, rectified: bool | None) -> Intrinsics:
+        """Return the camera of the first good message; drivers send zeros before they know their camera."""
         topic = self._topics.get(name)
         if topic is None or topic.type != CAMERA_INFO or topic.messages == 0:
             raise CameraError(
@@ -231,15 +232,20 @@ class Bag:
                 field="camera_info_topic",
                 suggestions={"camera_info_topic": None, "intrinsics": None},
             )
-        info = self._first(topic)
-        try:
-            return intrinsics_from_message(info)
-        except CameraError as error:
-            raise CameraError(f"{name}: {error}", path=self._path) from error
+        problem: CameraError | None = None
+        for _, raw in self._raw_messages(name):
+            with _wrap_errors(self._path, f"damaged message of {name}"):
+                info = self._message(raw, topic.type)
+            try:
+                return calibration_from_message(info).camera(rectified)
+            except CameraError as error:
+                problem = problem or error
+        reason = "holds no messages" if problem is None else str(problem)
+        raise CameraError(f"{name}: {reason}", path=self._path) from problem
 
 
 def _camera_info_beside(topic: str) -> str:
-    return topic.removesuffix(_COMPRESSED_DEPTH).rpartition("/")[0] + "/camera_info"
+    return topic.removesuffix(COMPRESSED_DEPTH).rpartition("/")[0] + "/camera_info"
 
 
 def _short(message_type: str) -> str:

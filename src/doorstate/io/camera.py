@@ -1,24 +1,29 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pinhole camera of a depth image: intrinsics, and the files that other tools store them in."""
+"""Camera of a depth image: a pinhole, and the distortion of its lens if the image is not rectified."""
 
 from __future__ import annotations
 
-import json
 import math
-from dataclasses import dataclass, fields
-from pathlib import Path
-from typing import Any, NamedTuple, Self
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import NamedTuple, Self
 
-from doorstate.errors import CameraError, summarize_exception
-from doorstate.io.plain_yaml import plain_documents
+import numpy as np
+from numpy.typing import NDArray
 
-_MAX_BYTES = 1 << 15  # of a camera file: YAML takes seconds per megabyte
-_ENTRIES = "entries width, height, fx, fy, cx, cy (or K)"
+from doorstate.errors import CameraError
+from doorstate.io.distortion import Distortion
 
 
 @dataclass(frozen=True)
 class Intrinsics:
-    """Pinhole intrinsics in pixels of a rectified image; pixel (0, 0) has its centre at (0, 0).
+    """Pinhole intrinsics in pixels; pixel (0, 0) has its centre at (0, 0).
+
+    Args:
+        width, height: size of the image.
+        fx, fy: focal lengths.
+        cx, cy: centre of projection.
+        distortion: of the lens; None for rectified images.
 
     Raises:
         CameraError: a size or focal length is not positive, or a number is not finite.
@@ -30,6 +35,7 @@ class Intrinsics:
     fy: float
     cx: float
     cy: float
+    distortion: Distortion | None = None
 
     def __post_init__(self) -> None:
         if min(self.width, self.height) < 1:
@@ -53,8 +59,25 @@ class Intrinsics:
         return cls(width, height, focal, focal, (width - 1) / 2, (height - 1) / 2)
 
     def turned_clockwise(self) -> Intrinsics:
-        """Return the intrinsics of the image rotated clockwise by 90 degrees: (u, v) goes to (height - 1 - v, u)."""
+        """Return the intrinsics of the image rotated clockwise by 90 degrees: (u, v) goes to (height - 1 - v, u).
+
+        Raises:
+            CameraError: the image is distorted.
+        """
+        if self.distortion is not None:
+            raise CameraError("a distorted image cannot be turned", expected="a rectified image")
         return Intrinsics(self.height, self.width, self.fy, self.fx, self.height - 1 - self.cy, self.cx)
+
+    def rays(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the slopes to the left and up of the ray of each pixel, which broadcast to (height, width).
+
+        NaN where no ray reaches a pixel through the lens.
+        """
+        if self.distortion is not None:
+            return _undistorted_rays(self)
+        left = (self.cx - np.arange(self.width, dtype=np.float64)) / self.fx  # (W,)
+        up = (self.cy - np.arange(self.height, dtype=np.float64)) / self.fy  # (H,)
+        return left, up[:, None]
 
     def check_image_size(self, width: int, height: int) -> None:
         """Check that an image has the size of the camera.
@@ -68,6 +91,15 @@ class Intrinsics:
                 field="intrinsics",
                 expected="those of this image size",
             )
+
+
+@lru_cache(maxsize=4)
+def _undistorted_rays(camera: Intrinsics) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    assert camera.distortion is not None
+    left, up = replace(camera, distortion=None).rays()
+    slopes = -camera.distortion.undo(-np.stack(np.broadcast_arrays(left, up), axis=-1))
+    slopes.flags.writeable = False
+    return slopes[..., 0], slopes[..., 1]
 
 
 class Pinhole(NamedTuple):
@@ -94,64 +126,3 @@ def pinhole_from_numbers(
     if fx is None or fy is None or cx is None or cy is None:
         raise CameraError("is missing", field=missing[0], expected="all four of fx, fy, cx and cy, or none")
     return Pinhole(fx, fy, cx, cy)
-
-
-def read_intrinsics(path: Path) -> Intrinsics:
-    """Read pinhole intrinsics from a JSON file or a ROS 1 / ROS 2 camera_info YAML file.
-
-    Accepted are `fx fy cx cy` (or RealSense's `ppx ppy` for the centre), a row-major 3 x 3 matrix `K` or
-    `k`, and `camera_matrix: {data: [...]}`; the size is `width height` or `image_width image_height`.
-    Distortion is not applied: depth images of the common drivers are rectified.
-
-    Raises:
-        CameraError: the file cannot be read, or a number is missing or impossible.
-    """
-    try:
-        text = _beginning(path).decode("utf-8-sig")
-        # A recorded topic (`rostopic echo`) is a stream of documents, and the first may be empty.
-        documents = [json.loads(text)] if path.suffix.lower() == ".json" else plain_documents(text)
-        return _from_mapping(next((document for document in documents if document is not None), None))
-    except CameraError as error:
-        raise error.located(path) from error
-    except OSError as error:
-        raise CameraError(f"cannot be read ({error.strerror or error})", path=path) from error
-    except Exception as error:  # on damaged bytes parsers raise exceptions of any type
-        raise CameraError(
-            f"not a JSON or YAML file with intrinsics ({summarize_exception(error)})", path=path
-        ) from error
-
-
-def _beginning(path: Path) -> bytes:
-    """Return the content of a file, or its YAML documents that end within `_MAX_BYTES`."""
-    with path.open("rb") as stream:
-        content = stream.read(_MAX_BYTES + 1)
-    if len(content) <= _MAX_BYTES:
-        return content
-    documents, separator, _ = content.rpartition(b"\n---")
-    if not separator:
-        raise CameraError(f"is larger than {_MAX_BYTES >> 10} KiB, so no camera")
-    return documents
-
-
-def _from_mapping(entries: Any) -> Intrinsics:
-    if not isinstance(entries, dict):
-        raise CameraError("holds no intrinsics", expected=_ENTRIES)
-    values = dict(entries)
-    for name, synonym in (("width", "image_width"), ("height", "image_height"), ("cx", "ppx"), ("cy", "ppy")):
-        values.setdefault(name, values.get(synonym))
-    matrix = values.get("K", values.get("k", values.get("camera_matrix")))
-    if isinstance(matrix, dict):
-        matrix = matrix.get("data")
-    if matrix is not None:
-        if isinstance(matrix, list) and len(matrix) == 3:
-            matrix = [number for row in matrix for number in row]
-        if not isinstance(matrix, list) or len(matrix) != 9:
-            raise CameraError("the camera matrix K must be nine numbers, row by row")
-        values |= {"fx": matrix[0], "cx": matrix[2], "fy": matrix[4], "cy": matrix[5]}
-    names = [field.name for field in fields(Intrinsics)]
-    if missing := [name for name in names if values.get(name) is None]:
-        raise CameraError(f"lacks {', '.join(missing)}", expected=_ENTRIES)
-    numbers = {name: float(values[name]) for name in names}
-    if not (numbers["width"].is_integer() and numbers["height"].is_integer()):
-        raise CameraError(f"image size {numbers['width']:g} x {numbers['height']:g} is not in whole pixels")
-    return Intrinsics(int(numbers.pop("width")), int(numbers.pop("height")), **numbers)

@@ -16,6 +16,8 @@ def depth_to_points(
 ) -> Points:
     """Return the point of each pixel of a depth image: x = depth, y = -(u - cx) x / fx, z = -(v - cy) x / fy.
 
+    Pixels of a distorted image are first moved to where a pinhole would show them.
+
     Args:
         depth_m: (H, W) depth along the viewing axis (not range), metres; NaN, infinite or <= 0 is no return.
         intrinsics: camera of the image as stored, before the roll is undone.
@@ -33,10 +35,11 @@ def depth_to_points(
     depth[~(np.isfinite(depth) & (depth > 0))] = np.nan
     points = np.empty((height, width, 3), dtype=np.float32)
     with np.errstate(over="ignore"):  # overflow gives infinity, which is "not measured"
-        left_slope = (intrinsics.cx - np.arange(width)) / intrinsics.fx  # (W,)
-        up_slope = (intrinsics.cy - np.arange(height)) / intrinsics.fy  # (H,)
+        left, up = intrinsics.rays()
+        if intrinsics.distortion is not None:
+            depth[np.isnan(left)] = np.nan
         points[..., 0] = depth
-        points[..., 1] = depth * left_slope
-        points[..., 2] = depth * up_slope[:, None]
+        points[..., 1] = depth * left
+        points[..., 2] = depth * up
         level = rotate(points, np.array(tilt_matrix(roll_deg, pitch_deg)))
         return level.astype(np.float32, copy=False)

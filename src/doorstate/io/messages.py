@@ -7,7 +7,6 @@ from collections.abc import Callable
 from typing import Any
 
 from doorstate.io.body_frame import points_from_depth, points_in_body
-from doorstate.io.camera import Intrinsics
 from doorstate.io.depth_messages import pixels_from_compressed_depth, pixels_from_image
 from doorstate.io.options import ReadOptions
 from doorstate.io.pointcloud2 import points_from_pointcloud2
@@ -36,17 +35,6 @@ def cloud_from_message(message: Any, message_type: str, options: ReadOptions) ->
         CameraError: an image without a camera, or with one of another size.
     """
     return _READERS[message_type](message, options)
-
-
-def intrinsics_from_message(info: Any) -> Intrinsics:
-    """Return the camera of a CameraInfo for rectified images: P, or K where P is not set, as depth_image_proc does.
-
-    Raises:
-        CameraError: the camera was not calibrated.
-    """
-    matrix, projection = (info.k, info.p) if hasattr(info, "k") else (info.K, info.P)  # ROS 2, ROS 1
-    numbers, places = (projection, (0, 5, 2, 6)) if projection[0] else (matrix, (0, 4, 2, 5))
-    return Intrinsics(info.width, info.height, *(float(numbers[place]) for place in places))
 
 
 def stamp_ns_of(message: Any) -> int:

@@ -30,6 +30,8 @@ class ReadOptions:
             in place of roll and pitch; its heading is left out.
         ignore_viewpoint: read points of PCD files as points in the frame of the camera, whatever VIEWPOINT says.
         intrinsics: camera of depth images; a `Pinhole` fits every image size.
+        rectified: True if depth images of a topic are rectified, False if not; None for what its name tells
+            (`calibration`).
         depth_scale_m: metres per unit of integer depth images.
         units_m: metres per unit of clouds and of floating point depth images (metres by ROS REP 118).
 
@@ -43,6 +45,7 @@ class ReadOptions:
     quaternion: Quaternion | None = None
     ignore_viewpoint: bool = False
     intrinsics: Intrinsics | Pinhole | None = None
+    rectified: bool | None = None
     depth_scale_m: float = 0.001
     units_m: float = 1.0
 

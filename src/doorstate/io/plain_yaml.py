@@ -16,6 +16,14 @@ class _PlainLoader(yaml.SafeLoader):
         return super().compose_node(parent, index)
 
 
+def _opencv(loader: _PlainLoader, suffix: str, node: yaml.MappingNode) -> dict[Any, Any]:
+    return loader.construct_mapping(node, deep=True)
+
+
+# OpenCV's FileStorage tags its matrices `!!opencv-matrix`.
+_PlainLoader.add_multi_constructor("tag:yaml.org,2002:opencv-", _opencv)
+
+
 def plain_documents(text: str) -> Iterator[Any]:
     """Iterate over the documents of a YAML stream.
 
