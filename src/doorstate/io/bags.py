@@ -22,7 +22,7 @@ from doorstate.io.bag_limits import (
     limited_sqlite,
     unpack_zstd,
 )
-from doorstate.io.calibration import COMPRESSED_DEPTH, calibration_from_message, is_rectified
+from doorstate.io.calibration import calibration_from_message, image_topic, is_rectified
 from doorstate.io.camera import Intrinsics
 from doorstate.io.depth_messages import check_compressed_format, check_encoding
 from doorstate.io.formats import BAG_SUFFIXES
@@ -245,7 +245,7 @@ class Bag:
 
 
 def _camera_info_beside(topic: str) -> str:
-    return topic.removesuffix(COMPRESSED_DEPTH).rpartition("/")[0] + "/camera_info"
+    return image_topic(topic).rpartition("/")[0] + "/camera_info"
 
 
 def _short(message_type: str) -> str:

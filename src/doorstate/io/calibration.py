@@ -17,7 +17,7 @@ from doorstate.errors import CameraError
 from doorstate.io.camera import Intrinsics, Pinhole
 from doorstate.io.distortion import parse_distortion
 
-COMPRESSED_DEPTH = "/compressedDepth"  # suffix of topic names by image_transport
+_TRANSPORTS = ("/compressedDepth", "/compressed")  # suffixes of topic names by image_transport
 
 
 @dataclass(frozen=True)
@@ -77,9 +77,14 @@ class Calibration:
         )
 
 
+def image_topic(topic: str) -> str:
+    """Return the name of a topic without the suffix of its image transport."""
+    return next((topic.removesuffix(suffix) for suffix in _TRANSPORTS if topic.endswith(suffix)), topic)
+
+
 def is_rectified(topic: str) -> bool | None:
     """Return whether images of a topic are rectified, by the names of image_proc; None if the name does not tell."""
-    name = topic.removesuffix(COMPRESSED_DEPTH).rpartition("/")[2]
+    name = image_topic(topic).rpartition("/")[2]
     if "rect" in name:
         return True
     return False if "raw" in name else None
