@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -13,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 START_NS = 1_700_000_000_000_000_000
+_MCAP = b"\x89MCAP0\r\n"
 KINDS = ("bag", "db3", "mcap")
 
 
@@ -119,6 +121,32 @@ def write_bag(folder: Path, kind: str, messages: Sequence[Message], compression:
                 connections[message.topic] = writer.add_connection(message.topic, full, typestore=store)
             content = _serialized(message, is_ros1)
             writer.write(connections[message.topic], message.stamp_ns + 1_000_000, content)
+    return path
+
+
+def write_mcap(path: Path, messages: Sequence[Message], profile: str, encoding: str) -> Path:
+    """Write an MCAP file without chunks and index; profile `ros1`, `ros2` or "", messages as `ros1` or `cdr`.
+
+    Source: https://mcap.dev/spec
+    """
+
+    def text(content: str) -> bytes:
+        return struct.pack("<I", len(content)) + content.encode()
+
+    def record(code: int, content: bytes) -> bytes:
+        return struct.pack("<BQ", code, len(content)) + content
+
+    is_ros1 = encoding == "ros1"
+    parts = [record(1, text(profile) + text("tests"))]
+    for number, message in enumerate(messages, start=1):
+        name = _full_name(message.type)
+        name = name.replace("/msg", "") if is_ros1 else name
+        schema = struct.pack("<H", number) + text(name) + text(f"{encoding}msg") + text("any")
+        channel = struct.pack("<HH", number, number) + text(message.topic) + text(encoding) + text("")
+        times = struct.pack("<HIQQ", number, 0, message.stamp_ns, message.stamp_ns)
+        parts += [record(3, schema), record(4, channel), record(5, times + _serialized(message, is_ros1))]
+    content = b"".join(parts) + record(15, bytes(4)) + record(2, bytes(20))
+    path.write_bytes(_MCAP + content + _MCAP)
     return path
 
 

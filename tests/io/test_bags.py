@@ -4,8 +4,10 @@
 from __future__ import annotations
 
 import io
+import os
 import struct
 import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -33,7 +35,9 @@ from tests.bag_writer import (
     image,
     text,
     write_bag,
+    write_mcap,
 )
+from tests.error_fields import about
 from tests.io.test_rvl import encode
 
 ORGANIZED = np.random.default_rng(0).normal(2, 1, (6, 8, 3)).astype(np.float32)
@@ -99,6 +103,52 @@ def test_clouds_are_read_in_order_with_their_stamps(kind: str, tmp_path: Path) -
     np.testing.assert_array_equal(first.cloud, ORGANIZED)
     np.testing.assert_array_equal(second.cloud, ORGANIZED + 1)
     np.testing.assert_array_equal(read(path, "/flat")[0].cloud, flat)
+
+
+@pytest.mark.parametrize(
+    ("profile", "encoding"), [("ros1", "ros1"), ("", "ros1"), ("ros2", "cdr"), ("", "cdr")]
+)
+def test_mcap_files_of_every_profile(profile: str, encoding: str, tmp_path: Path) -> None:
+    messages = [cloud("/points", ORGANIZED, START_NS + 1), text("/chatter")]
+    path = write_mcap(tmp_path / "a.mcap", messages, profile, encoding)
+    with open_bag(path) as bag:
+        assert bag.topics[1] == BagTopic("/points", "sensor_msgs/msg/PointCloud2", 1)
+    (stamped,) = read(path)
+    assert stamped.stamp_s == (START_NS + 1) / 1e9
+    np.testing.assert_array_equal(stamped.cloud, ORGANIZED)
+
+
+def test_mcap_messages_of_other_encodings_are_named(tmp_path: Path) -> None:
+    path = write_mcap(tmp_path / "a.mcap", [cloud("/points", ORGANIZED)], "", "protobuf")
+    assert "protobuf" in read_error(path, "/points").message
+    path = write_mcap(tmp_path / "b.mcap", [cloud("/points", ORGANIZED)], "other", "cdr")
+    assert "rofile" in read_error(path).message
+
+
+def test_bags_are_regular_files(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.bag")
+    (tmp_path / "zero.mcap").symlink_to("/dev/zero")
+    for name in ("pipe.bag", "zero.mcap"):
+        read_error(tmp_path / name)
+    folder = write_bag(tmp_path, "db3", [cloud("/points", ORGANIZED)])
+    (link := tmp_path / "linked").mkdir()
+    for file in folder.iterdir():
+        (link / file.name).symlink_to(file)
+    np.testing.assert_array_equal(read_one(link), ORGANIZED)
+    (link / f"{folder.name}.db3").unlink()
+    os.mkfifo(link / f"{folder.name}.db3")
+    with pytest.raises(CloudReadError, check=about(link / f"{folder.name}.db3")):
+        read(link)
+
+
+def test_a_large_metadata_file_is_refused_at_once(tmp_path: Path) -> None:
+    folder = write_bag(tmp_path, "db3", [cloud("/points", ORGANIZED)])
+    with (folder / "metadata.yaml").open("a") as stream:
+        stream.write("# more\n" * 300_000)
+    started = time.process_time()
+    with pytest.raises(CloudReadError, check=about(folder / "metadata.yaml")):
+        read(folder)
+    assert time.process_time() - started < 0.5
 
 
 @pytest.mark.parametrize("kind", ["db3", "mcap"])

@@ -9,9 +9,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from doorstate._input import check_input, read_input_text
+from doorstate.errors import CloudReadError, summarize_exception
+from doorstate.io.formats import BAG_SUFFIXES
 from doorstate.io.plain_yaml import plain_documents
 from doorstate.io.size_limits import MAX_FILE_BYTES
 
+_MAX_METADATA_BYTES = 1 << 18  # hundreds of topics and files; rosbags takes ten seconds per MiB
 MAX_UNPACKED = MAX_FILE_BYTES  # bytes of a message or of a chunk of messages
 
 
@@ -64,15 +68,28 @@ def limited_sqlite() -> Iterator[None]:
         apsw.connection_hooks.remove(limit)
 
 
-def check_metadata(folder: Path) -> None:
-    """Check that metadata.yaml has no aliases; no recorder writes any.
+def check_files(path: Path) -> None:
+    """Check that a bag is a regular file, or a folder of regular files and a metadata.yaml of usual size.
+
+    No recorder writes aliases into metadata.yaml; they can expand to gigabytes.
 
     Raises:
-        yaml.YAMLError: it has.
+        CloudReadError: it is not, with its path.
     """
-    text = (folder / "metadata.yaml").read_text(encoding="utf-8")
-    if "&" in text:  # no alias without an anchor; parsing is slow, and rosbags parses again
+    if not path.is_dir():
+        check_input(path)
+        return
+    for member in path.iterdir():
+        if member.suffix in (*BAG_SUFFIXES, ".zstd"):
+            check_input(member)
+    metadata = path / "metadata.yaml"
+    text = read_input_text(metadata, _MAX_METADATA_BYTES)
+    if "&" not in text:  # no alias without an anchor; parsing is slow, and rosbags parses again
+        return
+    try:
         list(plain_documents(text))
+    except Exception as error:  # on damaged text the parser raises exceptions of any type
+        raise CloudReadError(f"is damaged ({summarize_exception(error)})", path=metadata) from error
 
 
 def _unpack(decompressor: Callable[[], Any], packed: bytes) -> bytes:

@@ -15,8 +15,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from doorstate.errors import CameraError, CloudReadError, DoorstateError, missing_extra, summarize_exception
+from doorstate.io.bag_formats import CDR, ROS1, accept_any_profile, encoding_of, ros2_name
 from doorstate.io.bag_limits import (
-    check_metadata,
+    check_files,
     keep_packed,
     limit_unpacking,
     limited_sqlite,
@@ -82,34 +83,42 @@ def open_bag(path: Path) -> Iterator[Bag]:
         raise CloudReadError(
             "is not a bag", path=path, expected=f"a file {' '.join(BAG_SUFFIXES)}, or a ROS 2 bag folder"
         )
+    check_files(path)
     is_ros1 = path.is_file() and path.suffix == ".bag"
-    types = get_typestore(Stores.ROS1_NOETIC if is_ros1 else Stores.LATEST)
+    deserializers = {
+        ROS1: get_typestore(Stores.ROS1_NOETIC).deserialize_ros1,
+        CDR: get_typestore(Stores.LATEST).deserialize_cdr,
+    }
     limit_unpacking()
+    accept_any_profile()
     with ExitStack() as stack:
         with _wrap_errors(path, "damaged, or no bag"), limited_sqlite():
-            if path.is_dir():
-                check_metadata(path)
             reader = Reader1(path) if is_ros1 else Reader2(path)
             reader.open()
             stack.callback(reader.close)
             if not is_ros1:
                 keep_packed(reader)
-            bag = Bag(path, reader, types.deserialize_ros1 if is_ros1 else types.deserialize_cdr)
+            bag = Bag(path, reader, deserializers, is_ros1)
         yield bag
 
 
 class Bag:
     """Open bag, returned by `open_bag`."""
 
-    def __init__(self, path: Path, reader: Any, deserialize: Callable[[bytes, str], Any]) -> None:
+    def __init__(
+        self, path: Path, reader: Any, deserializers: dict[str, Callable[[bytes, str], Any]], is_ros1: bool
+    ) -> None:
         self._path = path
         self._reader = reader
-        self._deserialize = deserialize
+        self._deserializers = deserializers
+        self._encodings: dict[str, str] = {}  # by topic
         topics: dict[str, BagTopic] = {}
         for connection in reader.connections:
             name, message_type = connection.topic, connection.msgtype
             # SQLite and YAML may hold other types.
             if isinstance(name, str) and isinstance(message_type, str):
+                message_type = ros2_name(message_type)
+                self._encodings[name] = encoding_of(connection, is_ros1)
                 topic = topics.get(name, BagTopic(name, message_type, 0))
                 topics[name] = topic._replace(messages=topic.messages + int(connection.msgcount))
         self._topics = topics
@@ -160,7 +169,7 @@ class Bag:
         """
         convert = self._converter(topic, options, camera_info_topic)
         for log_ns, raw in islice(self._raw_messages(topic.name), 0, None, every):
-            yield self._stamped(log_ns, raw, topic.type, convert)
+            yield self._stamped(log_ns, raw, topic, convert)
 
     def _problem(self, name: str) -> str:
         """Return the reason why a topic cannot be read, or ""; images are checked by the encoding of the first."""
@@ -171,6 +180,8 @@ class Bag:
             return f"{name} holds no messages"
         if topic.type not in (CLOUD, IMAGE, COMPRESSED_IMAGE):
             return f"{name} holds {_short(topic.type)} messages"
+        if self._encodings[name] not in self._deserializers:
+            return f"{name} holds messages encoded as {self._encodings[name]!r}, not by ROS"
         if topic.type != CLOUD:
             try:
                 message = self._first(topic)
@@ -191,19 +202,20 @@ class Bag:
     def _first(self, topic: BagTopic) -> Any:
         _, raw = next(self._raw_messages(topic.name), (0, b""))
         with _wrap_errors(self._path, f"damaged message of {topic.name}"):
-            return self._message(raw, topic.type)
+            return self._message(raw, topic)
 
-    def _message(self, raw: bytes, message_type: str) -> Any:
-        return self._deserialize(unpack_zstd(raw) if raw[:4] == _ZSTD else raw, message_type)
+    def _message(self, raw: bytes, topic: BagTopic) -> Any:
+        deserialize = self._deserializers[self._encodings[topic.name]]
+        return deserialize(unpack_zstd(raw) if raw[:4] == _ZSTD else raw, topic.type)
 
     def _stamped(
-        self, log_ns: int, raw: bytes, message_type: str, convert: Callable[[Any], PosedCloud]
+        self, log_ns: int, raw: bytes, topic: BagTopic, convert: Callable[[Any], PosedCloud]
     ) -> StampedCloud:
         stamp_ns, frame_id = log_ns, ""
         cloud: Points | DoorstateError
         pose: SensorPose | None = None
         try:
-            message = self._message(raw, message_type)
+            message = self._message(raw, topic)
             stamp_ns = stamp_ns_of(message) or log_ns
             frame_id = message.header.frame_id
             cloud, pose = convert(message)
