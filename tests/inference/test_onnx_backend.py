@@ -124,6 +124,12 @@ def test_unusable_files_are_weights_errors(tmp_path: Path, exported: Path) -> No
 
     path = tmp_path / "door.onnx"
     assert error_of(path).path == path
+    model = onnx.load(exported)
+    model.ir_version = 9999
+    onnx.save(model, path)
+    with pytest.raises(WeightsError, match="too new for onnxruntime") as caught:
+        OnnxBackend(path)
+    assert caught.value.hint is not None
     for damaged in (b"", b"garbage", exported.read_bytes()[:5000]):
         path.write_bytes(damaged)
         assert error_of(path).path == path

@@ -6,6 +6,7 @@ from __future__ import annotations
 import sqlite3
 import time
 from contextlib import closing
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -90,7 +91,7 @@ def test_quality_of_service_in_a_database_is_not_parsed(tmp_path: Path) -> None:
     (store,) = folder.glob("*.db3")
     names = "abcdefghijklmnop"
     lines = ["a: &a [x, x, x, x, x, x, x, x, x]"]
-    lines += [f"{b}: &{b} [{', '.join([f'*{a}'] * 9)}]" for a, b in zip(names, names[1:], strict=False)]
+    lines += [f"{b}: &{b} [{', '.join([f'*{a}'] * 9)}]" for a, b in pairwise(names)]
     with closing(sqlite3.connect(store)) as database, database:
         database.execute("UPDATE topics SET offered_qos_profiles = ?", ["\n".join(lines)])
     started = time.process_time()

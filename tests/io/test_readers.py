@@ -16,7 +16,7 @@ from PIL import Image
 from doorstate.errors import MAX_MESSAGE_LENGTH, CameraError, CloudReadError
 from doorstate.io.camera import Intrinsics, Pinhole
 from doorstate.io.depth import depth_to_points
-from doorstate.io.formats import CLOUD_SUFFIXES, suffix_of_content, unpack_gzip
+from doorstate.io.formats import CLOUD_SUFFIXES, suffix_of_content, unpack_at_most, unpack_gzip
 from doorstate.io.options import ReadOptions
 from doorstate.io.pcd import write_pcd
 from doorstate.io.readers import parse_cloud, read_cloud
@@ -204,19 +204,21 @@ def test_files_packed_by_gzip(tmp_path: Path, valid: dict[str, bytes], suffix: s
     assert "gzip" in read_error(_write(tmp_path, f"b{suffix}.GZ", packed[:-9])).message
 
 
-def test_gzip_that_unpacks_to_too_much_is_refused_with_flat_memory(tmp_path: Path) -> None:
+def test_gzip_is_unpacked_up_to_a_limit_with_flat_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     packed = gzip.compress(bytes(1 << 20)) * 257  # several members are one file
+    assert unpack_at_most(packed, (1 << 20) + 5) == bytes((1 << 20) + 5)
     assert unpack_gzip(packed[: len(packed) // 257]) == bytes(1 << 20)
-    with pytest.raises(CloudReadError):
-        unpack_gzip(packed, max_bytes=(1 << 20) + 1)
     tracemalloc.start()
     try:
-        with pytest.raises(CloudReadError):
-            unpack_gzip(packed, max_bytes=1000)
+        assert unpack_at_most(packed, 1000) == bytes(1000)
         peak_bytes = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
     assert peak_bytes < 1e6
+    monkeypatch.setattr("doorstate.io.formats.MAX_FILE_BYTES", 1000)
+    monkeypatch.setattr("doorstate.io.size_limits.MAX_FILE_BYTES", 1000)
+    with pytest.raises(CloudReadError, check=lambda error: error.expected == "at most 1000"):
+        parse_cloud(gzip.compress(b"1 2 3\n" * 1000), ".xyz")
 
 
 @pytest.mark.parametrize("suffix", CLOUD_SUFFIXES)

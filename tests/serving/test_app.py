@@ -59,11 +59,14 @@ def test_abstention_has_a_reason_and_no_state() -> None:
         ("format=npy", "image/png"),
         ("format=.NPY", None),
         ("filename=my.cloud.NPY", "text/csv"),
+        ("filename=cloud.npy.gz", None),
+        ("filename=cloud", None),
+        ("", "application/octet-stream"),
         ("", "application/x-npy"),
         ("", "application/npy; version=1"),
     ],
 )
-def test_format_is_given_in_one_of_three_ways(
+def test_format_is_given_by_the_request_or_by_the_first_bytes(
     client: httpx.Client, query: str, content_type: str | None
 ) -> None:
     headers = {"content-type": content_type} if content_type else {}
@@ -132,8 +135,8 @@ def test_frame_roll_units_and_camera_transform_the_cloud(client: httpx.Client) -
         ("format=npy&axis=optical", NPY, 400, "axes"),
         ("format=npy", npy_bytes(np.ones((30, 40), np.uint16)), 400, "fx"),
         ("format=stl", NPY, 415, "pcd"),
-        ("filename=cloud", NPY, 415, "pcd"),
-        ("", NPY, 415, "pcd"),
+        ("filename=cloud.stl", NPY, 415, "pcd"),
+        ("", b"1 2 3\n", 415, "pcd"),
         ("format=npy", npy_bytes(CLOUD * np.nan), 422, ""),
         ("format=npy", npy_bytes(CLOUD[:0]), 422, ""),
         ("format=npy", npy_bytes(CLOUD * 1000), 422, "units=mm"),

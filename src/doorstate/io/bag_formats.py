@@ -21,7 +21,8 @@ def accept_any_profile() -> None:
 
     storage_mcap.read_string = partial(_read_string, storage_mcap.read_bytes)
     storage_mcap.get_msgdef = lambda _: MessageDefinition(MessageDefinitionFormat.NONE, "")
-    for module in (reader, storage_mcap, storage_sqlite3):
+    modules: tuple[Any, ...] = (reader, storage_mcap, storage_sqlite3)
+    for module in modules:
         module.parse_qos = lambda _: []
 
 

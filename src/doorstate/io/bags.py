@@ -7,7 +7,7 @@ that other messages cannot prevent its clouds from being read.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from itertools import islice
@@ -106,7 +106,7 @@ class Bag:
     """Open bag, returned by `open_bag`."""
 
     def __init__(
-        self, path: Path, reader: Any, deserializers: dict[str, Callable[[bytes, str], Any]], is_ros1: bool
+        self, path: Path, reader: Any, deserializers: Mapping[str, Callable[[bytes, str], Any]], is_ros1: bool
     ) -> None:
         self._path = path
         self._reader = reader

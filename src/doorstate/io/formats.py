@@ -10,7 +10,7 @@ import zlib
 from pathlib import PurePath
 
 from doorstate.errors import CloudReadError
-from doorstate.io.size_limits import MAX_FILE_BYTES
+from doorstate.io.size_limits import MAX_FILE_BYTES, check_byte_count
 
 CLOUD_SUFFIXES = (".pcd", ".ply", ".npy", ".npz", ".xyz", ".txt", ".csv", ".png")
 BAG_SUFFIXES = (".bag", ".db3", ".mcap")
@@ -71,19 +71,27 @@ def check_suffix(suffix: str) -> None:
         )
 
 
-def unpack_gzip(data: bytes, max_bytes: int = MAX_FILE_BYTES) -> bytes:
+def unpack_gzip(data: bytes) -> bytes:
     """Return the content of gzip data, and any other data as it is.
 
     Raises:
-        CloudReadError: damaged, or larger than `max_bytes`.
+        CloudReadError: damaged, or larger than one camera frame.
+    """
+    content = unpack_at_most(data, MAX_FILE_BYTES + 1)
+    check_byte_count(len(content))
+    return content
+
+
+def unpack_at_most(data: bytes, max_bytes: int) -> bytes:
+    """Return the first bytes of the content of gzip data, and any other data as it is.
+
+    Raises:
+        CloudReadError: damaged.
     """
     if data[: len(_GZIP)] != _GZIP:
         return data
     try:
         with gzip.GzipFile(fileobj=io.BytesIO(data)) as stream:
-            content = stream.read(max_bytes + 1)
+            return stream.read(max_bytes)
     except (OSError, EOFError, zlib.error) as error:
         raise CloudReadError(f"is damaged gzip data ({error})") from error
-    if len(content) > max_bytes:
-        raise CloudReadError(f"unpacks to more than {max_bytes} bytes", expected="one camera frame")
-    return content

@@ -15,6 +15,7 @@ from doorstate.inference.network_predictor import NetworkPredictor
 from doorstate.inference.predictor import Predictor
 from doorstate.inference.serialization import prediction_to_dict, require_points
 from doorstate.io.readers import parse_posed_cloud
+from doorstate.serving.body import read_body
 from doorstate.serving.errors import STATUS_DESCRIPTIONS, add_error_handlers
 from doorstate.serving.lingering_close import LingeringClose
 from doorstate.serving.models import ErrorResponse, HealthResponse, PredictionResponse
@@ -22,10 +23,16 @@ from doorstate.serving.request import PredictQuery, format_parameter
 from doorstate.serving.work_queue import Limits, WorkQueue
 
 _FILE = {"schema": {"type": "string", "format": "binary"}}
+_FORM = {"schema": {"type": "object", "properties": {"file": _FILE["schema"]}, "required": ["file"]}}
 _REQUEST_BODY = {
     "required": True,
-    "description": "Content of the file.",
-    "content": {"application/octet-stream": _FILE, "image/png": _FILE, "text/csv": _FILE},
+    "description": "Content of the file, or a form with the file as its only part; also packed by gzip.",
+    "content": {
+        "application/octet-stream": _FILE,
+        "image/png": _FILE,
+        "text/csv": _FILE,
+        "multipart/form-data": _FORM,
+    },
 }
 _WELCOME = f"""doorstate {__version__}: the state of a door from one depth-camera point cloud.
 
@@ -44,7 +51,8 @@ def create_app(predictor: Predictor, limits: Limits | None = None) -> FastAPI:
             of its own than there are processors left for each.
         limits: limits of the service; None for the defaults.
     """
-    queue = WorkQueue(limits or Limits())
+    limits = limits or Limits()
+    queue = WorkQueue(limits)
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
@@ -85,10 +93,11 @@ def create_app(predictor: Predictor, limits: Limits | None = None) -> FastAPI:
         openapi_extra={"requestBody": _REQUEST_BODY},
     )
     async def predict(request: Request, query: Annotated[PredictQuery, Query()]) -> dict[str, Any]:
-        options, suffix = query.read_options(), query.suffix(request.headers.get("content-type", ""))
+        options, suffix = query.read_options(), query.suffix()
 
         def predict_file(content: bytes) -> dict[str, Any]:
-            cloud, pose = parse_posed_cloud(content, suffix, options)
+            upload = read_body(content, request.headers, limits.max_bytes)
+            cloud, pose = parse_posed_cloud(upload.content, suffix or upload.suffix, options)
             prediction = require_points(predictor(cloud))
             return prediction_to_dict(prediction, format_parameter) | {"sensor_pose": pose.to_dict()}
 

@@ -3,19 +3,16 @@
 
 from __future__ import annotations
 
-from pathlib import PurePath
-
-from fastapi import HTTPException
 from pydantic import BaseModel, ConfigDict, Field
 
 from doorstate.io.camera import pinhole_from_numbers
-from doorstate.io.formats import CLOUD_SUFFIXES
+from doorstate.io.formats import CLOUD_SUFFIXES, format_suffix
 from doorstate.io.options import ReadOptions, metres_per_unit, unit_name
 from doorstate.io.rotations import parse_quaternion
+from doorstate.serving.body import unknown_format
 from doorstate.types import UNITS_M
 
 _FORMATS = [suffix.lstrip(".") for suffix in CLOUD_SUFFIXES]
-_FORMAT_OF_SUBTYPE = {"plain": "txt"}  # media subtypes that differ from the suffix
 # Parameters that are not spelled like the parameter of the library function they are passed to.
 _NAMES = {
     "roll_deg": "roll",
@@ -33,7 +30,8 @@ class PredictQuery(BaseModel):
 
     format: str | None = Field(
         None,
-        description="Format of the file. If it is missing, `filename` or the Content-Type gives the format.",
+        description="Format of the file. If it is missing, `filename`, the file name in a form, the Content-Type or the"
+        " first bytes of the file give it.",
         json_schema_extra={"enum": [*_FORMATS]},
     )
     filename: str | None = Field(None, description="File name; its suffix gives the format.")
@@ -79,24 +77,19 @@ class PredictQuery(BaseModel):
             units_m=metres_per_unit(self.units),
         )
 
-    def suffix(self, content_type: str) -> str:
-        """Return the suffix of the file: from `format`, or else from `filename`, or else from the Content-Type.
+    def suffix(self) -> str | None:
+        """Return the suffix of the file from `format`, or else from `filename`; None leaves it to the body.
 
         Raises:
             HTTPException: 415, not a format that can be read.
         """
         if self.format is not None:
-            name = self.format.lower().lstrip(".")
-        elif self.filename is not None:
-            name = PurePath(self.filename).suffix.lower().lstrip(".")
+            suffix = f".{self.format.lower().lstrip('.')}"
         else:
-            subtype = content_type.partition(";")[0].rpartition("/")[2].strip().lower().removeprefix("x-")
-            name = _FORMAT_OF_SUBTYPE.get(subtype, subtype)
-        if name not in _FORMATS:
-            raise HTTPException(
-                415, f"unknown file format: give the parameter format, one of {', '.join(_FORMATS)}"
-            )
-        return f".{name}"
+            suffix = format_suffix(self.filename or "")
+        if suffix and suffix not in CLOUD_SUFFIXES:
+            raise unknown_format()
+        return suffix or None
 
 
 def format_parameter(name: str, value: object = None) -> str:

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 INPUT, OUTPUT = "points", "probabilities"
 TENSOR_PREFIX = "weights."  # of names of tensors that a graph takes from a weights file
 _LOG_ERRORS_ONLY = 3
+# Parts of onnxruntime's messages about files that are newer than itself.
+_NEWER = ("Unsupported model IR version", "is under development and support for this is limited")
 
 
 class OnnxBackend:
@@ -94,6 +96,12 @@ def _open_session(path: Path, threads: int, weights: Path | None, spinning: bool
     try:
         return onnxruntime.InferenceSession(path, options, providers=["CPUExecutionProvider"])
     except Exception as error:  # onnxruntime's errors have no common class of their own
+        if any(word in str(error) for word in _NEWER):
+            raise WeightsError(
+                f"is too new for onnxruntime {onnxruntime.__version__}",
+                path=path,
+                hint="install a newer onnxruntime",
+            ) from error
         raise WeightsError(f"cannot be read as ONNX ({summarize_exception(error)})", path=path) from error
 
 
