@@ -20,7 +20,7 @@ def accept_any_profile() -> None:
     from rosbags.rosbag2 import reader, storage_mcap, storage_sqlite3
 
     storage_mcap.read_string = partial(_read_string, storage_mcap.read_bytes)
-    storage_mcap.get_msgdef = lambda _: MessageDefinition(MessageDefinitionFormat.NONE, "")
+    storage_mcap.get_msgdef = lambda schema: MessageDefinition(MessageDefinitionFormat.NONE, "")
     modules: tuple[Any, ...] = (reader, storage_mcap, storage_sqlite3)
     for module in modules:
         module.parse_qos = lambda _: []

@@ -247,7 +247,7 @@ class Bag:
         problem: CameraError | None = None
         for _, raw in self._raw_messages(name):
             with _wrap_errors(self._path, f"damaged message of {name}"):
-                info = self._message(raw, topic.type)
+                info = self._message(raw, topic)
             try:
                 return calibration_from_message(info).camera(rectified)
             except CameraError as error:
