@@ -109,6 +109,23 @@ def graphs(
 
 
 @app.command()
+def answers(
+    names: Annotated[
+        list[str] | None, typer.Argument(help="Packaged weights; all of them if not given.")
+    ] = None,
+    count: Annotated[int, typer.Option(help="Number of simulated doors.", min=3)] = 300,
+) -> None:
+    """Count how often packaged weights answer, and how often rightly, for `doorstate info` and the zoo."""
+    from doorstate.cli.progress import progress_bar
+    from doorstate.networks.packaged import packaged_networks
+
+    from .answers import write_answers
+
+    with progress_bar("Answers") as progress:
+        print(write_answers(names or packaged_networks(), count, progress))
+
+
+@app.command()
 def check() -> None:
     """Compare pages, scores and pictures with what results/ gives; exit code 1 if something differs."""
     from .check import check as check_all

@@ -102,7 +102,7 @@ def test_the_unpacked_wheel_answers(built: Path, simulated_folder: Path, tmp_pat
         text=True,
     )
     assert output.startswith(str(tmp_path))
-    assert "│  open │" in output
+    assert "  open  " in output
 
 
 @pytest.mark.slow

@@ -7,10 +7,11 @@ import hashlib
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from doorstate.networks import create_network, list_networks
+from doorstate.networks.answers import Answers, packaged_answers
 from doorstate.networks.card import WeightsCard
 from doorstate.networks.card_file import read_card
 from doorstate.networks.packaged import packaged_networks, packaged_weights
+from doorstate.networks.parameters import NUM_PARAMETERS
 
 
 class PackagedFile(NamedTuple):
@@ -19,15 +20,13 @@ class PackagedFile(NamedTuple):
     card: WeightsCard
     megabytes: float
     sha256: str
+    answers: Answers | None  # None until they are measured
 
 
 def content() -> Mapping[str, Any]:
     """Return the values of the page."""
     return {
-        "parameters": {
-            name: sum(p.numel() for p in create_network(name).parameters())
-            for name in (*list_networks(), "mvcnn")
-        },
+        "parameters": NUM_PARAMETERS,
         "packaged": {name: _packaged(name) for name in packaged_networks()},
     }
 
@@ -35,4 +34,6 @@ def content() -> Mapping[str, Any]:
 def _packaged(name: str) -> PackagedFile:
     path = packaged_weights(name)
     data = path.read_bytes()
-    return PackagedFile(read_card(path), len(data) / 1e6, hashlib.sha256(data).hexdigest())
+    return PackagedFile(
+        read_card(path), len(data) / 1e6, hashlib.sha256(data).hexdigest(), packaged_answers().get(name)
+    )

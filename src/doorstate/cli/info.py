@@ -17,9 +17,9 @@ _MISSING = "-"
 def info(as_json: AsJson = False) -> None:
     """List what is installed, the packaged weights, networks and rules.
 
-    Weights are listed with the share of clouds of a door that they answer, and that they answer rightly: clean frames of
-    a renderer, simulated doors like those they were trained on, and recorded frames. Paste the output into a report of
-    a problem.
+    Weights are listed with the share of clouds that they answer, and that they answer rightly: clean frames of other
+    doors, simulated doors like those they were trained on, and recorded frames. Paste the output into a report of a
+    problem.
 
     \b
     Examples:

@@ -62,7 +62,8 @@ class Output(NamedTuple):
             summary.print_failures()
         else:
             summary.print_errors()
-            summary.print_counts(f"; written to {self.path}" if self.path else "")
+            if self.path or summary.clouds > 1:
+                summary.print_counts(f"; written to {self.path}" if self.path else "")
         if summary.failures:
             raise typer.Exit(1)
 

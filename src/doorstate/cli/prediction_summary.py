@@ -17,11 +17,14 @@ class PredictionSummary:
 
     Args:
         noun: what is predicted on, such as "file".
+
+    Attributes:
+        clouds: number of clouds so far.
     """
 
     def __init__(self, noun: str) -> None:
         self._noun = noun
-        self._clouds = 0
+        self.clouds = 0
         self._states: dict[str, Counter[str | None]] = {}
         self._milliseconds: dict[str, list[float]] = {}
         self._errors: dict[str, list[tuple[str, str]]] = {}
@@ -33,7 +36,7 @@ class PredictionSummary:
 
     def add(self, name: str, rows: list[dict[str, Any]]) -> None:
         """Count the predictions of all methods for one cloud, or its error."""
-        self._clouds += 1
+        self.clouds += 1
         error = next((row["error"] for row in rows if "error" in row), None)
         if error is not None:
             alike = re.sub(r"\d+", "0", error)  # the same problem with other numbers
@@ -57,7 +60,7 @@ class PredictionSummary:
     def print_failures(self) -> None:
         """Print the number of failures on standard error, if there are any."""
         if self.failures:
-            stderr.print(f"no prediction for {self.failures} of {self._count(self._clouds)}")
+            stderr.print(f"no prediction for {self.failures} of {self._count(self.clouds)}")
 
     def print_counts(self, end: str = "") -> None:
         """Print a line for each method on standard output.
@@ -71,7 +74,7 @@ class PredictionSummary:
             counts += [f"{states[None]} none"] if states[None] else []
             label = f"{method}: " if len(self._states) > 1 else ""
             stdout.print(
-                f"{label}{self._count(self._clouds)}: {', '.join(counts)}{failed}; "
+                f"{label}{self._count(self.clouds)}: {', '.join(counts)}{failed}; "
                 f"{median(self._milliseconds[method]):.0f} ms each{end}"
             )
 
