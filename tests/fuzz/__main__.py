@@ -14,7 +14,9 @@ from pathlib import Path
 
 import atheris
 
-with atheris.instrument_imports(include=["doorstate.io", "pypcd4", "PIL", "rosbags", "ruamel", "yaml"]):
+with atheris.instrument_imports(
+    include=["doorstate.io", "doorstate.serving.body", "pypcd4", "PIL", "rosbags", "ruamel", "yaml"]
+):
     from tests.fuzz.targets import TARGETS
 
 

@@ -3,8 +3,11 @@
 
 from __future__ import annotations
 
+import gzip
 import io
 import json
+import re
+import struct
 from collections.abc import Callable
 from functools import cache
 from itertools import product
@@ -20,7 +23,8 @@ from pypcd4.pypcd4 import Encoding, PointCloud
 
 from doorstate.io.camera import Pinhole
 from doorstate.types import Points
-from tests.bag_writer import camera_info, cloud, compressed_image, image, text, write_bag
+from tests.bag_writer import camera_info, cloud, compressed_image, image, text, write_bag, write_mcap
+from tests.rvl import encode
 
 HEIGHT, WIDTH = 12, 16
 CAMERA = Pinhole(14.0, 14.0, 7.5, 5.5)
@@ -60,25 +64,78 @@ def png_of(points: Points) -> bytes:
     return saved(lambda stream: Image.fromarray(depth_of(points, "<u2")).save(stream, "PNG"))
 
 
+def rvl_of(points: Points) -> bytes:
+    return encode(depth_of(points, "<u2"))
+
+
 @cache
 def files(suffix: str) -> tuple[bytes, ...]:
     """Return valid files of a cloud format."""
     match suffix:
         case ".pcd":
-            return tuple(_pcd(points, kind) for points, kind in product(CLOUDS, Encoding))
+            return (*(_pcd(points, kind) for points, kind in product(CLOUDS, Encoding)), *_odd_pcd())
         case ".ply":
-            return tuple(_ply(points, kind) for points in CLOUDS for kind in ("ascii", "little", "big"))
+            kinds = ("ascii", "little", "big")
+            return (*(_ply(points, kind) for points in CLOUDS for kind in kinds), *map(_ply_of_lists, kinds))
         case ".png":
             return tuple(png_of(points) for points in CLOUDS)
         case ".npy" | ".npz":
             arrays = [*CLOUDS, *(depth_of(SCENE, dtype) for dtype in ("<f4", ">u2", "<i8"))]
+            arrays += [CLOUDS[1].T, _structured(SCENE), depth_of(SCENE, "<f4")[None]]
             save = np.save if suffix == ".npy" else np.savez_compressed
             return tuple(saved(lambda stream, array=array: save(stream, array)) for array in arrays)
-    return tuple(
+    plain = [
         _text(points, mark, header)
         for points in CLOUDS[1:]
         for mark, header in product(" ,;", ("", "x y z\n", "# z y x\n"))
+    ]
+    rows = plain[0]
+    count = b"%d\n" % (rows.count(b"\n") + 1)
+    named = b"Time (s),X [m],Y [m],Z [m]\n" + b"".join(b"0.1,%s\n" % row for row in plain[1].split(b"\n"))
+    decimal = _text(SCENE, ";", "").replace(b".", b",")
+    spelled = rows + b"\n-nan(ind) 1.#QNAN nan(0x7fc00000)\n1.#INF NA null"
+    quoted = b'"x","y","z"\n' + b"\n".join(
+        b'"%s"' % row.replace(b",", b'","') for row in plain[1].split(b"\n")
     )
+    odd = [count + rows, named, decimal, decimal.replace(b";", b" "), spelled, quoted]
+    return tuple(
+        plain + odd + [rows.replace(b"\n", b"\r"), rows.decode().encode("utf-16"), gzip.compress(rows)]
+    )
+
+
+def _odd_pcd() -> list[bytes]:
+    """Return files that PCL reads: COLUMNS, COUNT 0, no sizes, CR line ends."""
+    text, binary = _pcd(CLOUDS[1], Encoding.ASCII), _pcd(SCENE, Encoding.BINARY)
+    columns = text.replace(b"FIELDS", b"COLUMNS")
+    sizes = re.sub(rb"(SIZE|TYPE|COUNT) .*\n", b"", text)
+    empty = binary.replace(b"x y z", b"_ x y z").replace(b"SIZE 4", b"SIZE 1 4")
+    empty = empty.replace(b"TYPE F", b"TYPE U F").replace(b"COUNT 1", b"COUNT 0 1")
+    return [columns, sizes, empty, text.replace(b"\n", b"\r"), gzip.compress(binary)]
+
+
+def _ply_of_lists(kind: str) -> bytes:
+    """Return vertices with lists of other lengths before and after their coordinates."""
+    encoding = kind if kind == "ascii" else f"binary_{kind}_endian"
+    mark = ">" if kind == "big" else "<"
+    rows = []
+    for place, point in enumerate(CLOUDS[1].tolist()):
+        before, after = [7] * (place % 3), [8] * (place % 2)
+        cells = [len(before), *before, *point, len(after), *after]
+        form = f"{mark}B{len(before)}h3fi{len(after)}B"
+        rows.append(
+            " ".join(map(str, cells)).encode() + b"\n" if kind == "ascii" else struct.pack(form, *cells)
+        )
+    properties = "property list uchar short k\nproperty float x\nproperty float y\nproperty float z\n"
+    properties += "property list int uchar l\n"
+    header = f"ply\nformat {encoding} 1.0\nelement vertex {len(rows)}\n{properties}end_header\n"
+    return header.encode() + b"".join(rows)
+
+
+def _structured(points: Points) -> NDArray[Any]:
+    stored = np.zeros(points.shape[:-1], [("z", "<f4"), ("x", "<f8"), ("y", ">f4"), ("label", "u1")])
+    for axis, name in enumerate("xyz"):
+        stored[name] = points[..., axis]
+    return stored
 
 
 def _pcd(points: Points, encoding: Encoding) -> bytes:
@@ -103,6 +160,22 @@ def _ply(points: Points, kind: str) -> bytes:
 def _text(points: Points, separator: str, header: str) -> bytes:
     rows = "\n".join(separator.join(map(str, row)) for row in points.reshape(-1, 3)[:150].tolist())
     return (header.replace(" ", separator) + rows).encode()
+
+
+def bodies() -> tuple[bytes, ...]:
+    """Return bodies of requests: a file, a form, and both packed."""
+    name = 'Content-Disposition: form-data; name="file"; filename="cloud.npy"'
+    file = saved(lambda stream: np.save(stream, SCENE))
+    form = f"--edge\r\n{name}\r\n\r\n".encode() + file + b"\r\n--edge--\r\n"
+    return (file, form, gzip.compress(file), gzip.compress(form), form.replace(file, gzip.compress(file)))
+
+
+BODY_HEADERS: tuple[dict[str, str], ...] = (
+    {},
+    {"content-encoding": "gzip"},
+    {"content-type": "multipart/form-data; boundary=edge"},
+    {"content-type": "multipart/form-data; boundary=edge", "content-encoding": "gzip"},
+)
 
 
 @cache
@@ -135,6 +208,9 @@ def _messages(points: Points) -> list[Any]:
         compressed_image(
             "/depth/raw/compressedDepth", bytes(12) + png_of(SCENE), "16UC1; compressedDepth png"
         ),
+        compressed_image(
+            "/depth/rvl/compressedDepth", bytes(12) + rvl_of(SCENE), "16UC1; compressedDepth rvl"
+        ),
     ]
 
 
@@ -147,6 +223,11 @@ def bags(suffix: str) -> tuple[bytes, ...]:
             path = write_bag(Path(folder), suffix[1:], _messages(points), compression)
             file = path if path.is_file() else path / f"{path.name}{suffix}"
             contents.append(file.read_bytes())
+    if suffix == ".mcap":
+        with TemporaryDirectory() as folder:
+            for profile, encoding in product(("ros1", ""), ("ros1", "cdr", "json")):
+                path = write_mcap(Path(folder) / "a.mcap", _messages(SCENE), profile, encoding)
+                contents.append(path.read_bytes())
     return tuple(contents)
 
 

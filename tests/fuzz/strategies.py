@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from doorstate.io.camera import Intrinsics
 from doorstate.io.options import ReadOptions
-from tests.fuzz.examples import CAMERA, CLOUDS, HEIGHT, WIDTH, depth_of, files
+from tests.fuzz.examples import CAMERA, CLOUDS, HEIGHT, WIDTH, depth_of, files, rvl_of
 
 _TOKENS = (b"0", b"9", b"-1", b"99999999999", b"nan", b"\n", b" ", b",", b"x", b"#", b"\xff" * 4, b"\0" * 4)
 YAML_TOKENS = (
@@ -33,6 +33,7 @@ YAML_TOKENS = (
 _NUMBERS = (b"-1", b"0", b"1", b"2147483648", b"9223372036854775808", b"1" + b"0" * 30, b"nan", b"1e9", b"")
 _SIZES = (-1, 0, 1, 2, 3, 11, 12, 16, 80, 960, 65535, 2**31 - 1, 2**31, 2**32 - 1)
 _HEADER_BYTES = 300
+_RVL = ("16UC1; compressedDepth rvl",) * 3
 
 HEADER = SimpleNamespace(frame_id="camera_link")
 OPTIONS = st.builds(
@@ -133,10 +134,11 @@ def compressed_messages() -> st.SearchStrategy[SimpleNamespace]:
     """sensor_msgs/CompressedImage."""
     png, formats = (
         "16UC1; compressedDepth png",
-        ["32FC1; compressedDepth", "16UC1; compressedDepth rvl", "jpeg", ""],
+        ["32FC1; compressedDepth", *_RVL, "32FC1; compressedDepth rvl", "16UC1; png compressed", "jpeg", ""],
     )
     parameters = st.binary(min_size=12, max_size=12) | st.just(np.array([0, 100, 1], "<f4").tobytes())
-    data = st.builds(bytes.__add__, parameters, png_files()) | st.binary(max_size=20)
+    rvl = damaged([rvl_of(points) for points in CLOUDS])
+    data = st.builds(bytes.__add__, parameters, png_files() | rvl) | png_files() | st.binary(max_size=20)
     return st.builds(SimpleNamespace, format=_mostly(png, *formats), data=data)
 
 

@@ -15,6 +15,7 @@ from tempfile import TemporaryDirectory
 from types import SimpleNamespace
 
 import numpy as np
+from fastapi import HTTPException
 from hypothesis import strategies as st
 
 from doorstate.clouds.preparation import MIN_POINTS, CloudSpec, prepare_cloud
@@ -27,6 +28,9 @@ from doorstate.io.formats import BAG_SUFFIXES, CLOUD_SUFFIXES
 from doorstate.io.messages import cloud_from_message
 from doorstate.io.options import ReadOptions
 from doorstate.io.readers import parse_cloud, read_cloud
+from doorstate.io.rvl import parse_rvl
+from doorstate.serving.body import read_body
+from doorstate.serving.errors import STATUS_DESCRIPTIONS
 from doorstate.types import Points
 from tests.fuzz import examples, predictions, settings_files
 from tests.fuzz.harness import Target, check_line, fuzz_target, outcome_of
@@ -43,6 +47,7 @@ from tests.fuzz.strategies import (
 _SPEC = CloudSpec(num_points=MIN_POINTS)
 _SCRATCH = TemporaryDirectory()
 _FOLDER = Path(_SCRATCH.name)
+_MAX_BODY = 1 << 16
 _STEMS = ("cloud", b"\xff\xfe".decode(errors="surrogateescape"), "é", "a b\tc", "-", "%s{}")
 
 
@@ -90,6 +95,25 @@ def _read_camera(data: bytes, suffix: str) -> None:
 
 def _read_message(message: SimpleNamespace, options: ReadOptions, message_type: str) -> None:
     check(lambda: cloud_from_message(message, f"sensor_msgs/msg/{message_type}", options).points)
+
+
+def _read_rvl(data: bytes) -> None:
+    outcome_of(lambda: str(parse_rvl(data).shape))
+
+
+def _read_body(data: bytes, headers: dict[str, str]) -> None:
+    """Find the file in the body of a request; a refusal is a documented status, in one line."""
+
+    def read() -> str:
+        try:
+            upload = read_body(data, headers, _MAX_BODY)
+            assert len(upload.content) <= _MAX_BODY
+            return upload.suffix
+        except HTTPException as refusal:
+            check_line(refusal.detail)
+            return str(refusal.status_code)
+
+    assert outcome_of(read) in {*CLOUD_SUFFIXES, *map(str, STATUS_DESCRIPTIONS), "CloudReadError"}
 
 
 def _read_bag(path: Path, options: ReadOptions, topic_number: int) -> None:
@@ -148,7 +172,13 @@ def _targets() -> dict[str, Target]:
         targets[name] = fuzz_target(
             partial(_read_message, message_type=name), message=message, options=OPTIONS
         )
-    topic_number = st.integers(0, 5)
+    targets["rvl"] = fuzz_target(
+        _read_rvl, data=damaged([examples.rvl_of(cloud) for cloud in examples.CLOUDS])
+    )
+    targets["body"] = fuzz_target(
+        _read_body, data=damaged(examples.bodies()), headers=st.sampled_from(examples.BODY_HEADERS)
+    )
+    topic_number = st.integers(0, 7)
     for suffix in BAG_SUFFIXES:
         data = st.deferred(lambda suffix=suffix: damaged(examples.bags(suffix)))
         read = partial(_read_bag_file, suffix=suffix)

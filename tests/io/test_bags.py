@@ -38,7 +38,7 @@ from tests.bag_writer import (
     write_mcap,
 )
 from tests.error_fields import about
-from tests.io.test_rvl import encode
+from tests.rvl import encode
 
 ORGANIZED = np.random.default_rng(0).normal(2, 1, (6, 8, 3)).astype(np.float32)
 ORGANIZED[1, 2] = np.nan
