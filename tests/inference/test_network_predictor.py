@@ -71,7 +71,6 @@ def test_thinning_samples_a_grid_of_pixels(small_dataset: PreparedDataset) -> No
     every = NetworkPredictor(quick.backend, thin=False)
     assert quick(raw).probabilities == every(raw[::step, ::step]).probabilities
     assert quick(raw).probabilities != every(raw).probabilities
-    assert quick(raw.reshape(-1, 3)).probabilities == every(raw).probabilities  # neighbours in no image
 
 
 def test_fewer_points_than_trained_with_are_all_used(predictor: NetworkPredictor) -> None:

@@ -23,7 +23,7 @@ def decode(outputs: CloudOutputs, abstain_below: float, num_points: int, millise
         milliseconds: time from the raw cloud to the outputs.
     """
     heads = outputs.heads
-    abstention = _abstention(outputs, abstain_below)
+    abstention = abstention_of(outputs, abstain_below)
     prediction = Prediction(
         state=None if abstention else DoorState.from_index(int(outputs.probabilities.argmax())),
         num_points=num_points,
@@ -35,7 +35,10 @@ def decode(outputs: CloudOutputs, abstain_below: float, num_points: int, millise
     return prediction if abstention else replace(prediction, **_geometry(heads))
 
 
-def _abstention(outputs: CloudOutputs, abstain_below: float) -> Abstention | None:
+def abstention_of(outputs: CloudOutputs, abstain_below: float) -> Abstention | None:
+    """Return the reason why the outputs of a network give no state; None where they give one."""
+    if not outputs.are_valid():
+        return Abstention("invalid_outputs")
     p_door = outputs.heads.get("p_door")
     if p_door is not None and p_door < DECISION_THRESHOLD:
         return Abstention("no_door", {"probability": p_door})

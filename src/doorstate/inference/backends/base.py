@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
@@ -17,11 +18,25 @@ if TYPE_CHECKING:
     from doorstate.networks.base import PointNetwork
 
 
+SUM_TOLERANCE = 1e-3  # of probabilities in float16 or float32, from 1
+
+
 class CloudOutputs(NamedTuple):
     """Outputs of a network for one cloud."""
 
     probabilities: NDArray[np.float32]  # (3,)
     heads: Mapping[str, float]  # by column of the manifest, metres and degrees in the sensor frame
+
+    def are_valid(self) -> bool:
+        """Return True for finite numbers, among them probabilities of which those of the states sum to one."""
+        p = self.probabilities.astype(np.float64)
+        others = [value for name, value in self.heads.items() if name.startswith("p_")]
+        return (
+            bool(np.isfinite(p).all())
+            and abs(p.sum() - 1) <= SUM_TOLERANCE
+            and all(-SUM_TOLERANCE <= value <= 1 + SUM_TOLERANCE for value in (*p, *others))
+            and all(map(math.isfinite, self.heads.values()))
+        )
 
 
 class Outputs(NamedTuple):
@@ -29,11 +44,19 @@ class Outputs(NamedTuple):
 
     probabilities: NDArray[np.float32]  # (B, 3), calibrated
     heads: Columns  # (B,) each, by column of the manifest, metres and degrees in the sensor frame
+    withheld: NDArray[np.bool_] | None = None  # (B,) True where an exported network gives NaN for heads
 
     def per_cloud(self) -> list[CloudOutputs]:
         """Return the outputs of every cloud."""
         return [
-            CloudOutputs(row, {name: float(column[number]) for name, column in self.heads.items()})
+            CloudOutputs(
+                row,
+                {
+                    name: float(column[number])
+                    for name, column in self.heads.items()
+                    if self.withheld is None or not (self.withheld[number] and np.isnan(column[number]))
+                },
+            )
             for number, row in enumerate(self.probabilities)
         ]
 

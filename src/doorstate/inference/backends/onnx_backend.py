@@ -19,7 +19,9 @@ from doorstate.types import PARTS, STATES, Points
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-INPUT, OUTPUT = "points", "probabilities"
+INPUT, REASON = "points", "reason"
+PROBABILITIES, RAW_PROBABILITIES = "probabilities", "raw_probabilities"
+"""Outputs: probabilities, zero where the state is refused, and those that the network computed in any case."""
 TENSOR_PREFIX = "weights."  # of names of tensors that a graph takes from a weights file
 _LOG_ERRORS_ONLY = 3
 # Parts of onnxruntime's messages about files that are newer than itself.
@@ -55,16 +57,20 @@ class OnnxBackend:
         else:
             self.card, self.num_points = read_card(weights), None
         self._heads = head_names(self.card)
+        outputs = {output.name for output in self._session.get_outputs()}
+        # Packaged graphs, and files of doorstate 0.1, refuse nothing.
+        self._refuses = REASON in outputs
 
     def __call__(self, points: Points) -> Outputs:
         """Run the network on (B, n, 3) metres in farthest-point order, n as in `num_points`."""
-        probabilities, *heads = self._session.run([OUTPUT, *self._heads], {INPUT: points})
-        named_heads = dict(zip(self._heads, heads, strict=True))
-        return Outputs(probabilities, head_columns(named_heads, centroids(points)))
+        names = [RAW_PROBABILITIES, *self._heads, REASON] if self._refuses else [PROBABILITIES, *self._heads]
+        probabilities, *others = self._session.run(names, {INPUT: points})
+        columns = head_columns(dict(zip(self._heads, others, strict=False)), centroids(points))
+        return Outputs(probabilities, columns, others[-1] != 0 if self._refuses else None)
 
 
 def head_names(card: WeightsCard) -> tuple[str, ...]:
-    """Return the outputs of a file besides the probabilities: the heads of whole clouds."""
+    """Return the outputs of a file for heads: those of whole clouds."""
     return tuple(name for name in card.heads if name != PARTS)
 
 

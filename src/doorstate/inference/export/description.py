@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from doorstate import __version__
@@ -26,9 +28,9 @@ _DESCRIPTION = {
 }
 
 
-def describe(model: ModelProto, card: WeightsCard) -> None:
-    """Write the description of a graph and its card into its metadata."""
+def describe(model: ModelProto, card: WeightsCard, more: Mapping[str, str] = MappingProxyType({})) -> None:
+    """Write the description of a graph, further entries and its card into its metadata."""
     import onnx
 
-    onnx.helper.set_model_props(model, _DESCRIPTION | {CARD_KEY: card.model_dump_json()})
+    onnx.helper.set_model_props(model, _DESCRIPTION | dict(more) | {CARD_KEY: card.model_dump_json()})
     model.producer_name, model.producer_version = "doorstate", __version__

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""ONNX graph of a network, from sampled points in metres to probabilities."""
+"""ONNX graph of a network, from sampled points in metres to a state or the reason for a refusal."""
 
 from __future__ import annotations
 
@@ -9,11 +9,20 @@ import torch
 from torch import Tensor, nn
 
 from doorstate.clouds.normalization import SCALE_M
-from doorstate.inference.backends.onnx_backend import INPUT, OUTPUT, head_names
+from doorstate.inference.backends.onnx_backend import (
+    INPUT,
+    PROBABILITIES,
+    RAW_PROBABILITIES,
+    REASON,
+    head_names,
+)
+from doorstate.inference.export.refusals import REFUSED, Refusals
+from doorstate.inference.gate import Gate
 from doorstate.networks.base import PointNetwork
 from doorstate.networks.card import WeightsCard
 from doorstate.networks.head_layers import head_outputs
 from doorstate.networks.heads import STATE
+from doorstate.types import DOOR
 
 if TYPE_CHECKING:
     from onnx import ModelProto
@@ -37,17 +46,49 @@ class _MetresToProbabilities(nn.Module):
         return ((outputs.pop(STATE) / self.temperature).softmax(1), *outputs.values())
 
 
-def build_graph(network: PointNetwork, card: WeightsCard, num_points: int, opset: int) -> ModelProto:
+class _MetresToState(nn.Module):
+    """Network whose outputs are given only where its state is."""
+
+    def __init__(self, network: nn.Module, card: WeightsCard, refusals: Refusals) -> None:
+        super().__init__()
+        self.network = network
+        self.heads = head_names(card)
+        self.refusals = refusals
+
+    def forward(self, points: Tensor) -> tuple[Tensor, ...]:
+        raw, *values = self.network(points)
+        heads = dict(zip(self.heads, values, strict=True))
+        reason = self.refusals(points, raw, heads)
+        has_state = reason == 0
+        state = torch.where(has_state, raw.argmax(1), REFUSED)
+        # Zeros and not NaN, which would stay for ever in what a program averages over time.
+        probabilities = torch.where(has_state[:, None], raw, 0.0)
+        given = (
+            output if name == DOOR else torch.where(has_state[:, None], output, torch.nan)
+            for name, output in heads.items()
+        )
+        return state, reason, probabilities, raw, *given
+
+
+def build_graph(
+    network: PointNetwork, card: WeightsCard, num_points: int, opset: int, gate: Gate | None
+) -> ModelProto:
     """Return the optimized graph of a network that takes any number of clouds of `num_points`.
 
     Raises:
         ValueError: the exporter cannot write this opset. Its own errors are of any type.
     """
     # Folds batch normalisation into weights once instead of at every start, and the quantizer finds matrices.
-    return fold_constants(trace(network, card, num_points, opset))
+    return fold_constants(trace(network, card, num_points, opset, Refusals(card, gate)))
 
 
-def trace(network: PointNetwork, card: WeightsCard, num_points: int | None, opset: int) -> ModelProto:
+def trace(
+    network: PointNetwork,
+    card: WeightsCard,
+    num_points: int | None,
+    opset: int,
+    refusals: Refusals | None = None,
+) -> ModelProto:
     """Return the graph as torch writes it, with every tensor of the network in its initializers.
 
     Args:
@@ -55,10 +96,16 @@ def trace(network: PointNetwork, card: WeightsCard, num_points: int | None, opse
         card: card of its weights.
         num_points: points per cloud; None: any number from the network's `min_points`.
         opset: version of ONNX's operators.
+        refusals: refusals in the graph; None for the network alone.
 
     Raises:
         ValueError: the exporter cannot write this opset. Its own errors are of any type.
     """
+    module: nn.Module = _MetresToProbabilities(network.eval(), card)
+    outputs = [PROBABILITIES, *head_names(card)]
+    if refusals is not None:
+        module = _MetresToState(module, card, refusals)
+        outputs = [STATE, REASON, PROBABILITIES, RAW_PROBABILITIES, *head_names(card)]
     # Two clouds, because torch.export takes a size of one for a constant; more points than any network has centres.
     example = torch.linspace(-1, 1, 2 * (num_points or _EXAMPLE_POINTS) * 3).view(2, -1, 3)
     sizes: dict[int, object] = {0: torch.export.Dim("batch")}
@@ -66,7 +113,7 @@ def trace(network: PointNetwork, card: WeightsCard, num_points: int | None, opse
         sizes[1] = torch.export.Dim(INPUT, min=network.min_points)
     with torch.no_grad():
         program = torch.export.export(
-            _MetresToProbabilities(network.eval(), card),
+            module,
             (example,),
             dynamic_shapes=(sizes,),
             # Sizes are compared to see how torch lays out memory, which a graph does not know.
@@ -77,7 +124,7 @@ def trace(network: PointNetwork, card: WeightsCard, num_points: int | None, opse
             dynamo=True,
             opset_version=opset,
             input_names=[INPUT],
-            output_names=[OUTPUT, *head_names(card)],
+            output_names=outputs,
             optimize=False,
             verbose=False,
         )

@@ -11,8 +11,10 @@ from doorstate._jobs import Progress, no_progress
 from doorstate.errors import ExportError, summarize_exception
 from doorstate.inference.export.description import describe
 from doorstate.inference.export.graph import build_graph
+from doorstate.inference.export.outputs import describe_refusals
 from doorstate.inference.export.packages import OPSET, check_export_packages, without_warnings
 from doorstate.inference.export.parity import Parity, compare_with_torch
+from doorstate.inference.gate import DEFAULT_GATE, Gate
 from doorstate.inference.reference_clouds import LabelledClouds
 from doorstate.networks.base import PointNetwork
 from doorstate.networks.card import WeightsCard
@@ -29,6 +31,7 @@ def export_onnx(
     *,
     opset: int = OPSET,
     int8: bool = False,
+    gate: Gate | None = DEFAULT_GATE,
     progress: Progress = no_progress,
 ) -> Parity:
     """Write a network as an ONNX file that takes any number of clouds, after a comparison with torch.
@@ -40,6 +43,7 @@ def export_onnx(
         clouds: clouds for the comparison; the file takes as many points as they have.
         opset: version of ONNX's operators.
         int8: store the matrices of linear layers as 8-bit integers; then any difference is accepted.
+        gate: limits of the sampled points in the graph, and of the raw cloud in the metadata; None for none.
         progress: called with clouds compared and clouds in all.
 
     Raises:
@@ -53,10 +57,14 @@ def export_onnx(
     with atomic_path(path) as temporary:
         try:
             with without_warnings():
-                model = build_graph(network, card, num_points, opset)
+                model = build_graph(network, card, num_points, opset, gate)
                 if int8:
                     model = _quantize_linear_layers(model, temporary)
-                describe(model, card.model_copy(update={"num_points": num_points, "default_points": None}))
+                describe(
+                    model,
+                    card.model_copy(update={"num_points": num_points, "default_points": None}),
+                    describe_refusals(card, gate),
+                )
                 onnx.checker.check_model(model, full_check=True)
         except Exception as error:  # the exporter and the quantizer raise errors of any type
             raise ExportError(
@@ -64,7 +72,7 @@ def export_onnx(
             ) from error
         onnx.save(model, temporary)
         parity = compare_with_torch(temporary, network, card, clouds, progress)
-        if not int8 and parity.max_difference > parity.tolerance:
+        if not (int8 or parity.max_difference <= parity.tolerance):
             raise ExportError(
                 f"not written: its outputs differ from torch's by {parity.max_difference:.1g}, "
                 f"more than {parity.tolerance:.1g}",
