@@ -25,6 +25,7 @@ from doorstate.networks.head_layers import add_heads
 from doorstate.networks.heads import HEADS
 from doorstate.networks.layers.batch_norm import set_batchnorm
 
+OUTPUTS = ["state", "reason", "probabilities", "raw_probabilities"]
 SLOW = {"pointcnn"}
 
 
@@ -73,8 +74,8 @@ def test_the_file_agrees_with_torch(name: str, clouds: LabelledClouds, tmp_path:
     model = onnx.load(path)
     onnx.checker.check_model(model, full_check=True)
     assert model.opset_import[0].version == OPSET
-    (points,), (probabilities,) = model.graph.input, model.graph.output
-    assert (points.name, probabilities.name) == ("points", "probabilities")
+    (points,), outputs = model.graph.input, [output.name for output in model.graph.output]
+    assert (points.name, outputs) == ("points", OUTPUTS)
     batch, *fixed = points.type.tensor_type.shape.dim
     assert batch.dim_param
     assert [size.dim_value for size in fixed] == [160, 3]
@@ -88,19 +89,22 @@ def test_the_file_agrees_with_torch(name: str, clouds: LabelledClouds, tmp_path:
 def test_heads_are_outputs_of_the_file(clouds: LabelledClouds, tmp_path: Path) -> None:
     network, heads = network_trained_on("pointnet2", clouds), (*HEADS, "parts")
     add_heads(network, heads)
+    torch.nn.init.constant_(network.heads["door"].linear.bias, 9.0)  # type: ignore[union-attr, arg-type]
     card = card_of("pointnet2").model_copy(update={"heads": heads})
-    parity = export_onnx(tmp_path / "network.onnx", network.eval(), card, clouds)
+    parity = export_onnx(tmp_path / "network.onnx", network.eval(), card, clouds, gate=None)
     assert parity.max_difference <= TOLERANCE
     exported = OnnxBackend(tmp_path / "network.onnx")
-    _, expected = TorchBackend(network, card)(clouds.points)
-    probabilities, columns = exported(clouds.points)
+    expected = TorchBackend(network, card)(clouds.points).heads
+    probabilities, columns, withheld = exported(clouds.points)
+    assert withheld is not None
+    assert not withheld.any()
     assert list(columns) == list(expected)
     for name, values in expected.items():
         assert np.ptp(values) > 0 or name.endswith("width_m")  # widths are cut at 0
         np.testing.assert_allclose(columns[name], values, atol=0.01 if name.endswith("_deg") else 1e-4)
     assert np.array_equal(probabilities, exported(clouds.points)[0])
     outputs = [output.name for output in onnx.load(tmp_path / "network.onnx").graph.output]
-    assert outputs == ["probabilities", *HEADS]
+    assert outputs == [*OUTPUTS, *HEADS]
 
 
 def test_int8_is_a_quarter_of_the_size_and_differs(clouds: LabelledClouds, tmp_path: Path) -> None:
