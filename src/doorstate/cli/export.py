@@ -45,8 +45,9 @@ def export(
     from doorstate.cli.progress import progress_bar
     from doorstate.inference.export import TOLERANCE, check_export_packages, export_onnx
     from doorstate.inference.reference_clouds import reference_clouds
+    from doorstate.networks.card_file import read_card
     from doorstate.networks.packaged import packaged_weights
-    from doorstate.networks.weights import load_weights, read_card
+    from doorstate.networks.weights import load_weights
 
     name, source = only_method(Methods(network, weights))
     if out is not None and out.suffix != ".onnx":
