@@ -122,6 +122,28 @@ def latency(
 
 
 @app.command()
+def busy(
+    out: Out,
+    network: Annotated[str, typer.Option(help="Packaged weights.")] = "pointnet2",
+    threads: Annotated[str, typer.Option(help="Numbers of threads, separated by commas.")] = "1,2",
+    processes: Annotated[
+        str, typer.Option(help="Numbers of processes that keep processors busy, separated by commas.")
+    ] = "0,2",
+    repeats: Repeats = 25,
+) -> None:
+    """Latency of an answer while other processes keep the processors busy, by threads and what they do waiting."""
+    from benchmarks.busy import busy_table, measure_busy
+    from doorstate.cli.progress import progress_bar
+
+    numbers_of_threads = _parse_integers("threads", threads, 1)
+    with progress_bar("busy") as progress:
+        rows = measure_busy(
+            network, numbers_of_threads, _parse_integers("processes", processes, 0), repeats, progress
+        )
+    _finish(out, "busy", rows, busy_table(rows), network=network, processes=processes, repeats=repeats)
+
+
+@app.command()
 def rules(
     out: Out,
     count: Annotated[int, typer.Option(help="Clouds, of all states.", min=1)] = 60,
