@@ -5,15 +5,18 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from doorstate.clouds.measured import is_measured
+from doorstate.clouds.outliers import remove_outliers
 from doorstate.clouds.preparation import prepare_cloud
 from doorstate.clouds.samplers import NUMPY, Sampler, choose_sampler
 from doorstate.clouds.thinning import thinned_pixels, thinned_points
+from doorstate.errors import TooFewPointsError
 from doorstate.evaluation.table import Table, number
 from doorstate.inference.backends import run_by_size
 from doorstate.inference.decode import decode
@@ -48,18 +51,26 @@ class ThinningResult(NamedTuple):
 def measure_thinning(network: str, clouds: Iterable[tuple[str, Points]]) -> list[ThinningResult]:
     """Return the predictions of packaged weights with all numbers of candidates.
 
+    Clouds without outliers are compared; one that has too few points in any form is left out.
+
     Args:
         network: name of packaged weights.
         clouds: states and organized clouds (H, W, 3) in metres.
     """
     predictor = NetworkPredictor.from_weights(network, thin=False)
     samplers = {sampler.library: sampler for sampler in (NUMPY, choose_sampler(import_torch=True))}
-    return [result for state, cloud in clouds for result in _results(predictor, state, cloud, samplers)]
+    results = []
+    for state, cloud in clouds:
+        clean = remove_outliers(cloud).points
+        with suppress(TooFewPointsError):
+            results += list(_results(predictor, state, clean, samplers))
+    return results
 
 
 def _results(
     predictor: NetworkPredictor, state: str, cloud: Points, samplers: dict[str, Sampler]
 ) -> Iterator[ThinningResult]:
+    spec = predictor.spec.model_copy(update={"remove_outliers": False})
     for form, per_point in [
         ("all", None),
         *((f, c) for f in ("organized", "flat") for c in CANDIDATES_PER_POINT),
@@ -68,8 +79,8 @@ def _results(
         milliseconds = {}
         for library, sampler in samplers.items():
             started = time.perf_counter()
-            part = _thin(cloud, form, fewest, predictor.spec.max_depth_m)
-            points = prepare_cloud(part, predictor.spec, sampler).points
+            part = _thin(cloud, form, fewest, spec.max_depth_m)
+            points = prepare_cloud(part, spec, sampler).points
             milliseconds[library] = (time.perf_counter() - started) * 1000
         (outputs,) = run_by_size(predictor.backend, [points])
         predicted = decode(outputs, predictor.card.abstain_below, len(points), 0.0).state

@@ -6,7 +6,7 @@ from __future__ import annotations
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -16,6 +16,7 @@ from doorstate.clouds.normalization import normalize
 from doorstate.clouds.preparation import CloudSpec, prepare_cloud
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import CloudContentError
+from doorstate.inference.backends import Outputs
 from doorstate.inference.backends.torch_backend import TorchBackend
 from doorstate.inference.network_predictor import NetworkPredictor
 from doorstate.inference.rule_predictor import RulePredictor
@@ -28,7 +29,7 @@ from doorstate.networks.packaged import packaged_networks, packaged_weights
 from doorstate.networks.weights import save_weights
 from doorstate.simulation.frames import replay
 from doorstate.simulation.manifest import unflatten
-from doorstate.types import STATES
+from doorstate.types import STATES, Points
 from tests.hand_made_clouds import image_of_a_rough_wall
 
 
@@ -296,3 +297,17 @@ def test_points_beyond_the_depth_of_the_training_data_are_ignored(small_dataset:
 
 def test_a_simulated_dataset_has_the_range_of_its_camera(small_dataset: PreparedDataset) -> None:
     assert small_dataset.depth_range_m == 5.0
+
+
+def test_warming_up_gives_an_exported_network_all_its_points() -> None:
+    class FixedSize(TorchBackend):
+        num_points = 1024
+        counts: ClassVar[list[int]] = []
+
+        def __call__(self, points: Points) -> Outputs:
+            self.counts.append(points.shape[1])
+            return super().__call__(points)
+
+    card = WeightsCard(network="pointnet", num_points=1024)
+    NetworkPredictor(FixedSize(create_network("pointnet"), card)).warm_up()
+    assert FixedSize.counts == [1024]

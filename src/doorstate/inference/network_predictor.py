@@ -164,7 +164,9 @@ class NetworkPredictor(Predictor):
         """Run once on noise, so that the first cloud is as quick as later ones; the process keeps freed memory."""
         super().warm_up()
         cloud = np.random.default_rng(0).normal(2.0, 1.0, (self.num_points, 3)).astype(np.float32)
-        self.backend(prepare_cloud(cloud, CloudSpec(num_points=self.num_points)).points[None])
+        # All points of noise could be outliers, and an exported network takes only as many points as it was made for.
+        spec = CloudSpec(num_points=self.num_points, remove_outliers=False)
+        self.backend(prepare_cloud(cloud, spec).points[None])
 
     def _sample(self, cloud: Points) -> _Sample:
         """Clean and sample one cloud, unless it has too few points, and check it with the gate."""
