@@ -126,20 +126,25 @@ def busy(
     out: Out,
     network: Annotated[str, typer.Option(help="Packaged weights.")] = "pointnet2",
     threads: Annotated[str, typer.Option(help="Numbers of threads, separated by commas.")] = "1,2",
+    runtimes: Annotated[
+        str, typer.Option(help="onnxruntime, torch, or both, separated by a comma.")
+    ] = "onnxruntime,torch",
     processes: Annotated[
         str, typer.Option(help="Numbers of processes that keep processors busy, separated by commas.")
     ] = "0,2",
     repeats: Repeats = 25,
 ) -> None:
     """Latency of an answer while other processes keep the processors busy, by threads and what they do waiting."""
-    from benchmarks.busy import busy_table, measure_busy
+    from benchmarks.busy import RUNTIMES, busy_table, measure_busy
     from doorstate.cli.progress import progress_bar
 
+    names = [name.strip() for name in runtimes.split(",")]
+    if not set(names) <= set(RUNTIMES):
+        raise ConfigError(f"cannot use {runtimes!r}", field="runtimes", expected=" or ".join(RUNTIMES))
     numbers_of_threads = _parse_integers("threads", threads, 1)
+    numbers_of_busy = _parse_integers("processes", processes, 0)
     with progress_bar("busy") as progress:
-        rows = measure_busy(
-            network, numbers_of_threads, _parse_integers("processes", processes, 0), repeats, progress
-        )
+        rows = measure_busy(network, names, numbers_of_threads, numbers_of_busy, repeats, progress)
     _finish(out, "busy", rows, busy_table(rows), network=network, processes=processes, repeats=repeats)
 
 

@@ -6,11 +6,9 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from pathlib import Path
 from typing import NamedTuple
 from unittest.mock import patch
 
@@ -22,22 +20,19 @@ from benchmarks.timing import format_ms, summarize_ms
 from benchmarks.workers import Worker
 from doorstate._jobs import Progress
 from doorstate.evaluation.table import Table
+from doorstate.inference.backends import Backend, load_backend
 from doorstate.inference.backends.onnx_backend import OnnxBackend
-from doorstate.inference.backends.torch_backend import TorchBackend
-from doorstate.inference.export import export_onnx
 from doorstate.inference.network_predictor import NetworkPredictor
-from doorstate.inference.reference_clouds import reference_clouds
-from doorstate.networks.packaged import packaged_weights
-from doorstate.networks.weights import load_weights
+from doorstate.networks.packaged import packaged_graph, packaged_weights
 
 RUNTIMES = ("onnxruntime", "torch")
 WAITING = ("sleep", "spin")
 _REST_S = 0.1  # threads that spin after a call stop before the next form is measured
 _NOTE = (
-    "Milliseconds of one answer from a simulated 640 × 480 cloud in memory, median (90th percentile). *Busy*: processes "
-    "that compute all the time beside it. *Waiting threads*: *sleep* is `session.intra_op.allow_spinning` 0 of "
-    "onnxruntime and `OMP_WAIT_POLICY=PASSIVE` of torch, *spin* what both do by default. All forms take turns within "
-    "one run; × is the median ratio to the default (onnxruntime, sleep) with as many threads as processors within a turn."
+    "Milliseconds of one answer from a simulated 640 × 480 cloud in memory, median (90th percentile). *Busy*: "
+    "processes that compute all the time beside it. *Waiting threads*: *sleep* is `session.intra_op.allow_spinning` 0 "
+    "of onnxruntime and `OMP_WAIT_POLICY=PASSIVE` of torch, *spin* what both libraries do on their own. All forms take "
+    "turns; × is the median ratio, within a turn, to onnxruntime with most threads that sleep."
 )
 
 
@@ -52,17 +47,9 @@ class Form(NamedTuple):
 class Answers:
     """Predictor in a process of its own."""
 
-    def __init__(self, form: Form, weights: Path, exported: Path) -> None:
-        if form.runtime == "torch":
-            import torch
-
-            torch.set_num_threads(form.threads)
-            predictor = NetworkPredictor(TorchBackend(*load_weights(weights)))
-        else:
-            spinning = form.waiting == "spin"
-            predictor = NetworkPredictor(OnnxBackend(exported, form.threads, spinning=spinning))
-        predictor.warm_up()
-        self._predictor, self._cloud = predictor, raw_cloud()
+    def __init__(self, form: Form, network: str) -> None:
+        self._predictor, self._cloud = NetworkPredictor(_backend(form, network)), raw_cloud()
+        self._predictor.warm_up()
         self.milliseconds()
 
     def milliseconds(self) -> float:
@@ -72,8 +59,19 @@ class Answers:
         return (time.perf_counter() - started) * 1000
 
 
+def _backend(form: Form, network: str) -> Backend:
+    if form.runtime == "onnxruntime":
+        weights, spinning = packaged_weights(network), form.waiting == "spin"
+        return OnnxBackend(packaged_graph(network), form.threads, weights=weights, spinning=spinning)
+    import torch
+
+    torch.set_num_threads(form.threads)
+    return load_backend(network, backend="torch")
+
+
 def measure_busy(
     network: str,
+    runtimes: Sequence[str],
     numbers_of_threads: Sequence[int],
     numbers_of_busy: Sequence[int],
     repeats: int,
@@ -83,6 +81,7 @@ def measure_busy(
 
     Args:
         network: name of packaged weights.
+        runtimes: some of `RUNTIMES`.
         numbers_of_threads: threads of a call; a single thread never waits for others, so it has one form.
         numbers_of_busy: processes that compute all the time.
         repeats: turns of all forms.
@@ -90,16 +89,13 @@ def measure_busy(
     """
     forms = [
         Form(runtime, threads, waiting)
-        for runtime in RUNTIMES
+        for runtime in runtimes
         for threads in numbers_of_threads
         for waiting in (WAITING if threads > 1 else WAITING[:1])
     ]
-    weights, rows = packaged_weights(network), []
-    with tempfile.TemporaryDirectory() as folder, ExitStack() as workers:
-        exported = Path(folder) / f"{network}.onnx"
-        loaded, card = load_weights(weights)
-        export_onnx(exported, loaded, card, reference_clouds(3, card.points_in_use))
-        answers = {form: workers.enter_context(_worker(form, weights, exported)) for form in forms}
+    rows = []
+    with ExitStack() as workers:
+        answers = {form: workers.enter_context(_worker(form, network)) for form in forms}
         for worker in answers.values():
             worker.call("milliseconds")
         for number, busy in enumerate(numbers_of_busy):
@@ -124,11 +120,11 @@ def _turn(answers: dict[Form, Worker]) -> dict[Form, float]:
     return times
 
 
-def _worker(form: Form, weights: Path, exported: Path) -> Worker:
+def _worker(form: Form, network: str) -> Worker:
     policy = {"OMP_WAIT_POLICY": "PASSIVE"} if form.waiting == "sleep" else {}
     environment = {name: value for name, value in os.environ.items() if name != "OMP_WAIT_POLICY"}
     with patch.dict(os.environ, environment | policy, clear=True):
-        return Worker(Answers, form, weights, exported)
+        return Worker(Answers, form, network)
 
 
 @contextmanager
@@ -150,7 +146,9 @@ def busy_table(rows: Sequence[Result]) -> Table:
     for form in dict.fromkeys((row["runtime"], row["threads"], row["waiting"]) for row in rows):
         cells.append([*map(str, form)])
         for busy in numbers:
-            own, default = (_times(rows, chosen, busy) for chosen in (form, ("onnxruntime", most, "sleep")))
+            own, default = (
+                _times(rows, chosen, busy) for chosen in (form, (rows[0]["runtime"], most, "sleep"))
+            )
             summary = summarize_ms(own)
             cells[-1] += [
                 f"{format_ms(summary['median_ms'])} ({format_ms(summary['p90_ms'])})",

@@ -16,6 +16,7 @@ import pytest
 import torch
 
 from doorstate._jobs import no_progress
+from doorstate.clouds.samplers import choose_sampler
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import ConfigError, RunError
 from doorstate.rules import list_rules
@@ -145,18 +146,37 @@ def test_latency_is_the_sum_of_its_stages(tmp_path: Path) -> None:
     few = ("--points", "128", "--threads", "1", "--repeats", "1")
     assert run("latency", "--networks", "pointnet", "--out", tmp_path, *few)[0] == 0
     _, rows, markdown = read_results(tmp_path, "latency")
-    assert [(row["network"], row["runtime"], row["points"], row["threads"]) for row in rows] == [
-        ("pointnet", "torch", 128, 1),
-        ("pointnet", "onnxruntime", 128, 1),
-        ("pointnet", "onnxruntime int8", 128, 1),
+    compiled = choose_sampler(import_torch=True).library
+    exported = [
+        ("pointnet", runtime, library, 128, 1)
+        for runtime in ("onnxruntime", "onnxruntime int8")
+        for library in dict.fromkeys((compiled, "numpy"))
     ]
+    columns = ("network", "runtime", "sampling", "points", "threads")
+    assert [tuple(row[column] for column in columns) for row in rows] == [
+        ("pointnet", "torch", compiled, 128, 1),
+        *exported,
+    ]
+    assert all(row["ratio"] == 1 for row in rows if row["sampling"] == compiled)
     for row in rows:
         stages = {name: stage["median_ms"] for name, stage in row["stages"].items()}
         total = stages.pop("total")
         assert set(stages) == {"clean", "sample", "network"}
         assert all(duration_ms > 0 for duration_ms in stages.values())
         assert sum(stages.values()) == pytest.approx(total)
-        assert f"| {row['network']} | {row['runtime']} | 128 | 1 |" in markdown
+        assert f"| {row['network']} | {row['runtime']} | {row['sampling']} | 128 | 1 |" in markdown
+
+
+def test_busy_has_a_row_for_every_form_and_number_of_processes(tmp_path: Path) -> None:
+    few = ("--runtimes", "onnxruntime", "--threads", "1,2", "--processes", "0,1", "--repeats", "1")
+    assert run("busy", "--out", tmp_path, *few)[0] == 0
+    _, rows, markdown = read_results(tmp_path, "busy")
+    forms = {(row["runtime"], row["threads"], row["waiting"]) for row in rows}
+    assert forms == {("onnxruntime", 1, "sleep"), ("onnxruntime", 2, "sleep"), ("onnxruntime", 2, "spin")}
+    assert len(rows) == 2 * len(forms)
+    assert all(len(row["milliseconds"]) == 1 and row["milliseconds"][0] > 0 for row in rows)
+    (default,) = (line for line in markdown.splitlines() if line.startswith("| onnxruntime | 2 | sleep |"))
+    assert default.count("| 1.00 |") == 2
 
 
 def test_latency_of_rules_and_networks(tmp_path: Path) -> None:
