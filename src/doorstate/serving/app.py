@@ -3,24 +3,26 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from typing import Annotated, Any
+from typing import Annotated
 
-from fastapi import FastAPI, Query, Request
-from fastapi.responses import PlainTextResponse
+from fastapi import FastAPI, HTTPException, Query, Request, Response
+from fastapi.responses import HTMLResponse, JSONResponse, PlainTextResponse
 
 from doorstate import __version__
-from doorstate.inference.network_predictor import NetworkPredictor
-from doorstate.inference.predictor import Predictor
-from doorstate.inference.serialization import prediction_to_dict, require_points
-from doorstate.io.readers import parse_posed_cloud
-from doorstate.serving.body import read_body
+from doorstate.serving.access import Access, AccessControl
+from doorstate.serving.api_page import render_api_page
 from doorstate.serving.errors import STATUS_DESCRIPTIONS, add_error_handlers
 from doorstate.serving.lingering_close import LingeringClose
+from doorstate.serving.metrics import CONTENT_TYPE, CountRequests, Metrics
 from doorstate.serving.models import ErrorResponse, HealthResponse, PredictionResponse
-from doorstate.serving.request import PredictQuery, format_parameter
-from doorstate.serving.work_queue import Limits, WorkQueue
+from doorstate.serving.request import PredictQuery
+from doorstate.serving.uploads import Uploads
+from doorstate.serving.work_queue import WorkQueue
+from doorstate.serving.worker import Job, Reply
+from doorstate.types import ABSTAINED
 
 _FILE = {"schema": {"type": "string", "format": "binary"}}
 _FORM = {"schema": {"type": "object", "properties": {"file": _FILE["schema"]}, "required": ["file"]}}
@@ -38,21 +40,23 @@ _WELCOME = f"""doorstate {__version__}: the state of a door from one depth-camer
 
 POST /predict?format=pcd  predict the state; the body of the request is the file
 GET  /health              state of the service, and the network or rule it uses
+GET  /metrics             numbers for Prometheus
 GET  /openapi.json        description of the interface (OpenAPI)
-GET  /docs                the same as a page, which loads scripts from a public server
+GET  /docs                the same as a page
 """
 
 
-def create_app(predictor: Predictor, limits: Limits | None = None) -> FastAPI:
-    """Return the service as an ASGI application.
+def create_app(queue: WorkQueue, access: Access | None = None) -> FastAPI:
+    """Return the service as an ASGI application; it ends the workers of the queue when it stops.
 
     Args:
-        predictor: predicts the files. It is called from `limits.workers` threads, so torch should use no more threads
-            of its own than there are processors left for each.
-        limits: limits of the service; None for the defaults.
+        queue: workers that predict the files.
+        access: who may use the service; None admits everybody who reaches it by an address or a name of this machine.
     """
-    limits = limits or Limits()
-    queue = WorkQueue(limits)
+    method = queue.wait_until_ready()
+    uploads, metrics = Uploads(queue.limits), Metrics()
+    metrics.waiting.set_function(lambda: queue.waiting)
+    metrics.bytes_in_flight.set_function(lambda: uploads.total_bytes)
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
@@ -64,22 +68,37 @@ def create_app(predictor: Predictor, limits: Limits | None = None) -> FastAPI:
         description="The state of a door from one depth-camera point cloud.",
         version=__version__,
         lifespan=lifespan,
+        docs_url=None,
         redoc_url=None,
     )
     app.add_middleware(LingeringClose)
+    app.add_middleware(AccessControl, access=access or Access())
+    app.add_middleware(CountRequests, metrics=metrics)
     add_error_handlers(app)
 
     @app.get("/", response_class=PlainTextResponse, include_in_schema=False)
     async def welcome() -> str:
         return _WELCOME
 
+    @app.get("/docs", response_class=HTMLResponse, include_in_schema=False)
+    async def docs() -> str:
+        return render_api_page(app.openapi())
+
+    @app.get("/metrics", include_in_schema=False)
+    async def numbers() -> Response:
+        return Response(metrics.text(), media_type=CONTENT_TYPE)
+
     @app.get("/health", summary="State of the service", response_model_exclude_none=True)
-    async def health() -> HealthResponse:
-        if isinstance(predictor, NetworkPredictor):
-            return HealthResponse(
-                ready=True, version=__version__, network=predictor.name, points=predictor.num_points
-            )
-        return HealthResponse(ready=True, version=__version__, rule=predictor.name)
+    async def health(response: Response) -> HealthResponse:
+        response.status_code = 503 if queue.problem else 200
+        return HealthResponse(
+            ready=not queue.problem,
+            version=__version__,
+            network=method.network,
+            points=method.points,
+            rule=method.rule,
+            problem=queue.problem or None,
+        )
 
     @app.post(
         "/predict",
@@ -92,15 +111,27 @@ def create_app(predictor: Predictor, limits: Limits | None = None) -> FastAPI:
         },
         openapi_extra={"requestBody": _REQUEST_BODY},
     )
-    async def predict(request: Request, query: Annotated[PredictQuery, Query()]) -> dict[str, Any]:
-        options, suffix = query.read_options(), query.suffix()
-
-        def predict_file(content: bytes) -> dict[str, Any]:
-            upload = read_body(content, request.headers, limits.max_bytes)
-            cloud, pose = parse_posed_cloud(upload.content, suffix or upload.suffix, options)
-            prediction = require_points(predictor(cloud))
-            return prediction_to_dict(prediction, format_parameter) | {"sensor_pose": pose.to_dict()}
-
-        return await queue.run(request, predict_file)
+    async def predict(request: Request, query: Annotated[PredictQuery, Query()]) -> Response:
+        options, suffix = query.read_options(), query.suffix(request.headers.get("content-type", ""))
+        queue.check_space()
+        limit_s, problem = queue.limits.timeout_s, "the upload was not complete"
+        upload = None
+        try:
+            async with asyncio.timeout(limit_s):
+                upload = await uploads.read(request)
+                problem = "there was no result"
+                reply = await queue.run(Job(bytes(upload.content), suffix, options))
+        except TimeoutError as error:
+            raise HTTPException(504, f"{problem} after {limit_s:g} s") from error
+        finally:
+            if upload is not None:
+                uploads.release(upload)
+        _count(metrics, reply)
+        return JSONResponse(reply.body, reply.status)
 
     return app
+
+
+def _count(metrics: Metrics, reply: Reply) -> None:
+    if reply.status == 200:
+        metrics.predictions.labels(reply.body["state"] or ABSTAINED).inc()

@@ -17,15 +17,19 @@ from doorstate.serving.request import PredictQuery, format_parameter
 
 STATUS_DESCRIPTIONS = {
     400: "The file is damaged, or a parameter is wrong.",
-    413: "The file is too large.",
+    401: "A bearer token is needed.",
+    408: "No part of the file arrived for some seconds.",
+    413: "The file is too large, or needs too much memory.",
     415: "The format of the file is missing or unknown.",
+    421: "The Host header names another machine.",
     422: "The file was read, but its cloud cannot be used.",
+    500: "The service has a fault; its log says more.",
     503: "Too many files are waiting. Retry-After gives the seconds to wait.",
-    504: "The file arrived too slowly, or no worker was free in time.",
+    504: "The file arrived too slowly, took too long to process, or no worker was free in time.",
 }
 _ADVICE = {
-    404: "not found: POST a file to /predict, or GET /, /health or /openapi.json",
-    405: "method not allowed: POST a file to /predict, or GET /, /health or /openapi.json",
+    404: "not found: POST a file to /predict, or GET /, /health, /metrics, /docs or /openapi.json",
+    405: "method not allowed: POST a file to /predict, or GET /, /health, /metrics, /docs or /openapi.json",
 }
 
 

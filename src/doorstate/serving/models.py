@@ -61,6 +61,7 @@ class HealthResponse(BaseModel):
     network: str | None = Field(default=None, description="Name of the network.")
     points: int | None = Field(default=None, description="Number of points that the network gets.")
     rule: str | None = Field(default=None, description="Name of the rule, if no network predicts.")
+    problem: str | None = Field(default=None, description="Reason why the service is not ready.")
 
 
 class ErrorResponse(BaseModel):

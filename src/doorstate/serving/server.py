@@ -1,16 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Uvicorn server with a listening socket of its own."""
+"""Uvicorn server with a listening socket of its own, guarded connections and dated log lines."""
 
 from __future__ import annotations
 
 import math
 import signal
 import socket
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import uvicorn
 
 from doorstate.errors import DoorstateError
+from doorstate.serving.connections import guarded_protocol
+from doorstate.serving.limits import Limits
 
 if TYPE_CHECKING:
     from fastapi import FastAPI
@@ -18,31 +20,56 @@ if TYPE_CHECKING:
 # Longer than clients (httpx: 5 s) and proxies (nginx: 60 s) keep an idle connection. If the service closes it first,
 # a request sent at that moment is lost to a reset.
 KEEP_ALIVE_S = 75
+_MAX_HEAD_BYTES = 16 * 1024
 
 
-def create_server(app: FastAPI, timeout_s: float, verbose: bool = False) -> uvicorn.Server:
-    """Return a server that ends with exit code 0 on SIGINT and SIGTERM, after the requests in progress.
+def create_server(app: FastAPI, limits: Limits, verbose: bool = False) -> uvicorn.Server:
+    """Return a server.
 
     Args:
         app: application to serve.
-        timeout_s: longest time of a request.
+        limits: limits of the service.
         verbose: log requests on standard error.
     """
-    server = uvicorn.Server(
+    return uvicorn.Server(
         uvicorn.Config(
             app,
-            http="h11",
+            http=guarded_protocol(limits),
             ws="none",
-            log_level="info" if verbose else "warning",
+            log_config=log_config(verbose),
             access_log=verbose,
+            h11_max_incomplete_event_size=_MAX_HEAD_BYTES,
             timeout_keep_alive=KEEP_ALIVE_S,
-            timeout_graceful_shutdown=math.ceil(timeout_s),
+            timeout_graceful_shutdown=math.ceil(limits.timeout_s),
         )
     )
+
+
+def stop_on_signals(server: uvicorn.Server) -> None:
+    """Let SIGINT and SIGTERM end the server with exit code 0, after the requests in progress."""
     # Uvicorn stops at these signals, and raises them again when it has stopped, which would look like a failure.
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: setattr(server, "should_exit", True))
-    return server
+
+
+def log_config(verbose: bool) -> dict[str, Any]:
+    """Return the configuration of the loggers: lines with date and time on standard error."""
+    return {
+        "version": 1,
+        "disable_existing_loggers": False,
+        "formatters": {
+            "dated": {
+                "format": "%(asctime)s.%(msecs)03d %(levelname)s %(message)s",
+                "datefmt": "%Y-%m-%dT%H:%M:%S",
+            }
+        },
+        "handlers": {
+            "stderr": {"class": "logging.StreamHandler", "formatter": "dated", "stream": "ext://sys.stderr"}
+        },
+        "loggers": {
+            "uvicorn": {"handlers": ["stderr"], "level": "INFO" if verbose else "WARNING", "propagate": False}
+        },
+    }
 
 
 def listen(host: str, port: int) -> socket.socket:
@@ -53,7 +80,7 @@ def listen(host: str, port: int) -> socket.socket:
     """
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:
-        listener = socket.create_server((host, port), family=family)
+        listener = socket.create_server((host, port), family=family, backlog=1024)
     except OSError as error:
         reason = str(error.strerror or error).partition(" (while")[0]  # Python repeats the address there
         raise DoorstateError(f"cannot listen on {host}, port {port}: {reason}") from error

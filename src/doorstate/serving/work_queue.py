@@ -1,107 +1,122 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Bounded work of a service: size of files, speed of clients, and number of files that wait."""
+"""Files that wait for worker processes; large files have a worker of low priority to themselves."""
 
 from __future__ import annotations
 
 import asyncio
+import queue
 import threading
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
-from typing import TypeVar
 
-from fastapi import HTTPException, Request
+from fastapi import HTTPException
 
-from doorstate._jobs import default_workers
-
-Result = TypeVar("Result")
-
-
-@dataclass(frozen=True)
-class Limits:
-    """Limits of one service; requests beyond them are refused.
-
-    Args:
-        max_bytes: size of a file.
-        timeout_s: time from the head of a request to its response, including the upload.
-        queue: number of complete files that wait for a worker.
-        workers: number of files that are processed at the same time, each in a thread.
-    """
-
-    max_bytes: int = 64 * 2**20
-    timeout_s: float = 30.0
-    queue: int = 16
-    workers: int = field(default_factory=default_workers)
+from doorstate.serving.limits import Limits
+from doorstate.serving.worker import LOW_PRIORITY, Job, LoadPredictor, Method, Reply, Worker
 
 
 class WorkQueue:
-    """Reads files from requests, and processes them in worker threads; to be used from one event loop.
+    """Worker processes and the files that wait for them, for one event loop.
+
+    A large file takes long to read. It goes to one more worker, of low priority, so that any number of them slows the
+    others by a few percent. That worker starts with the first large file.
 
     Args:
+        load: loads the predictor, in each worker.
         limits: limits of the service.
     """
 
-    def __init__(self, limits: Limits) -> None:
-        self._limits = limits
-        self._pool = ThreadPoolExecutor(limits.workers, "doorstate")
-        self._slots = threading.Semaphore(limits.workers + limits.queue)
-        # An upload takes no slot, so that slow clients do not block others; its bytes are counted instead.
-        self._max_total_bytes = (limits.workers + limits.queue) * limits.max_bytes
-        self._total_bytes = 0
+    def __init__(self, load: LoadPredictor, limits: Limits) -> None:
+        self.limits = limits
+        self._quick = _Lane([Worker(load, limits.memory_bytes) for _ in range(limits.workers)], limits.queue)
+        self._large = _Lane([Worker(load, limits.memory_bytes, LOW_PRIORITY)], max(1, limits.queue // 8))
 
-    async def run(self, request: Request, work: Callable[[bytes], Result]) -> Result:
-        """Call `work` in a worker thread with the body of a request, and return its result.
+    async def run(self, job: Job) -> Reply:
+        """Return the reply of a worker.
 
         Raises:
-            HTTPException: 400 length that is no number, 413 too large, 503 too many files, 504 too slow.
-            ClientDisconnect: the client closed the connection.
+            HTTPException: 503, too many files wait.
         """
-        if not self._take_slot():
-            raise _busy()
-        self._slots.release()  # taken again once the upload is complete
-        file, problem = bytearray(), "the upload was not complete"
-        try:
-            async with asyncio.timeout(self._limits.timeout_s):
-                await self._read(request, file)
-                problem = "there was no result"
-                return await self._work(work, bytes(file))
-        except TimeoutError as error:
-            raise HTTPException(504, f"{problem} after {self._limits.timeout_s:g} s") from error
-        finally:
-            self._total_bytes -= len(file)
+        lane = self._large if len(job.content) >= self.limits.large_bytes else self._quick
+        return await lane.run(job, self.limits.work_timeout_s)
+
+    def check_space(self) -> None:
+        """Refuse an upload that would have to wait with too many others.
+
+        Raises:
+            HTTPException: 503, too many files wait.
+        """
+        self._quick.check_space()
+
+    @property
+    def problem(self) -> str:
+        """Reason why no file can be predicted; empty while the workers do their work."""
+        return self._quick.problem
+
+    @property
+    def waiting(self) -> int:
+        """Number of files that wait for a worker or are processed."""
+        return self._quick.taken + self._large.taken
+
+    def wait_until_ready(self) -> Method:
+        """Return the network or rule, once all workers have loaded it.
+
+        Raises:
+            DoorstateError: the predictor cannot be loaded.
+        """
+        return self._quick.wait_until_ready()
 
     def close(self) -> None:
-        """Drop the waiting files, and stop the workers."""
-        self._pool.shutdown(cancel_futures=True)
+        """Drop the waiting files, and end the workers."""
+        self._quick.close()
+        self._large.close()
 
-    async def _read(self, request: Request, file: bytearray) -> None:
-        limit = self._limits.max_bytes
-        too_large = HTTPException(413, f"the file is larger than {limit / 2**20:g} MiB")
-        try:
-            declared = int(request.headers.get("content-length", 0))
-        except ValueError as error:
-            raise HTTPException(400, "Content-Length is not a number") from error
-        if declared > limit:
-            raise too_large
-        async for chunk in request.stream():
-            file += chunk
-            self._total_bytes += len(chunk)
-            if len(file) > limit:
-                raise too_large
-            if self._total_bytes > self._max_total_bytes:
-                raise _busy()
 
-    async def _work(self, work: Callable[[bytes], Result], file: bytes) -> Result:
-        if not self._take_slot():
-            raise _busy()
-        future = self._pool.submit(work, file)
-        # The slot is free when the work is done, which may be after the client got a time-out.
-        future.add_done_callback(lambda _: self._slots.release())
+class _Lane:
+    """Workers that share a queue."""
+
+    def __init__(self, workers: list[Worker], length: int) -> None:
+        self._workers = workers
+        self._idle: queue.SimpleQueue[Worker] = queue.SimpleQueue()
+        for worker in workers:
+            self._idle.put(worker)
+        self._threads = ThreadPoolExecutor(len(workers), "doorstate-worker")
+        self._size = len(workers) + length
+        self._lock = threading.Lock()
+        self.taken = 0
+        self.problem = ""
+
+    async def run(self, job: Job, timeout_s: float) -> Reply:
+        self.check_space()
+        self._change(1)
+        future = self._threads.submit(self._work, job, timeout_s)
+        # The place is free when the work is done, which may be after the client got a time-out.
+        future.add_done_callback(lambda _: self._change(-1))
         return await asyncio.wrap_future(future)
 
-    def _take_slot(self) -> bool:
-        return self._slots.acquire(blocking=False)
+    def check_space(self) -> None:
+        if self.taken >= self._size:
+            raise HTTPException(503, "too many files are waiting", {"Retry-After": "1"})
 
+    def wait_until_ready(self) -> Method:
+        for worker in self._workers:
+            worker.start()
+        *_, method = [worker.wait_until_ready() for worker in self._workers]
+        return method
 
-def _busy() -> HTTPException:
-    return HTTPException(503, "too many files are waiting", {"Retry-After": "1"})
+    def close(self) -> None:
+        for worker in self._workers:
+            worker.close()
+        self._threads.shutdown(cancel_futures=True)
+
+    def _work(self, job: Job, timeout_s: float) -> Reply:
+        worker = self._idle.get()
+        try:
+            reply = worker.run(job, timeout_s)
+            self.problem = reply.body["error"] if reply.status == 503 else ""
+            return reply
+        finally:
+            self._idle.put(worker)
+
+    def _change(self, by: int) -> None:
+        with self._lock:
+            self.taken += by

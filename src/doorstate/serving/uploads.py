@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Uploads in progress: their size, their speed, and the bytes of all of them together."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import Counter
+
+from fastapi import HTTPException, Request
+
+from doorstate.serving.limits import Limits
+
+_IDLE_S = 0.5  # an upload without a byte for this time gives way to others
+
+
+class Uploads:
+    """Bodies of requests, within a number of bytes for all; to be used from one event loop.
+
+    When the bytes are used up, the upload that has been idle for the longest time ends, and its bytes are free.
+
+    Args:
+        limits: limits of the service.
+    """
+
+    def __init__(self, limits: Limits) -> None:
+        self._limits = limits
+        self._open: dict[_Upload, None] = {}
+        self._client_bytes: Counter[str] = Counter()
+        self.total_bytes = 0
+
+    async def read(self, request: Request) -> Upload:
+        """Return the body of a request, whose bytes count until `release`.
+
+        Raises:
+            HTTPException: 400 length that is no number, 408 too slow, 413 too large, 503 too many bytes.
+            ClientDisconnect: the client closed the connection.
+        """
+        _check_declared(request, self._limits.max_bytes)
+        upload = _Upload(request.client.host if request.client else "", self._limits.stall_timeout_s)
+        self._open[upload] = None
+        try:
+            async with asyncio.timeout(self._limits.stall_timeout_s) as upload.deadline:
+                async for chunk in request.stream():
+                    self._add(upload, chunk)
+        except TimeoutError as error:
+            self.release(upload)
+            raise HTTPException(408, f"no part of the file arrived for {upload.patience_s:g} s") from error
+        except BaseException:
+            self.release(upload)
+            raise
+        finally:
+            del self._open[upload]
+        return upload
+
+    def release(self, upload: Upload) -> None:
+        """Stop counting the bytes of an upload."""
+        self._count(upload, -len(upload.content))
+        upload.content = bytearray()
+
+    def _add(self, upload: _Upload, chunk: bytes) -> None:
+        if len(upload.content) + len(chunk) > self._limits.max_bytes:
+            raise _too_large(self._limits.max_bytes)
+        while self._is_full(upload, len(chunk)):
+            if not self._end_idle(upload):
+                raise HTTPException(503, "too many files are being received", {"Retry-After": "1"})
+        upload.content += chunk
+        self._count(upload, len(chunk))
+        upload.progress()
+
+    def _is_full(self, upload: _Upload, size: int) -> bool:
+        # Half of the bytes are kept for other clients.
+        of_client = self._client_bytes[upload.client] + size
+        alone = len(self._client_bytes) == 1
+        limit = self._limits.bytes_in_flight
+        return self.total_bytes + size > limit or (not alone and of_client > max(limit // 2, size))
+
+    def _end_idle(self, newcomer: _Upload) -> bool:
+        """End the upload that has been idle for the longest time; return false if there is none."""
+        now = asyncio.get_running_loop().time()
+        idle = [
+            upload
+            for upload in self._open
+            if upload is not newcomer and upload.content and now - upload.last_s > _IDLE_S
+        ]
+        if not idle:
+            return False
+        longest = min(idle, key=lambda upload: upload.last_s)
+        longest.end()
+        self.release(longest)
+        return True
+
+    def _count(self, upload: Upload, size: int) -> None:
+        self.total_bytes += size
+        self._client_bytes[upload.client] += size
+        if self._client_bytes[upload.client] <= 0:
+            del self._client_bytes[upload.client]
+
+
+class Upload:
+    """Content of a request."""
+
+    def __init__(self, client: str) -> None:
+        self.client = client
+        self.content = bytearray()
+
+
+class _Upload(Upload):
+    """Upload in progress, and the time of its last part."""
+
+    def __init__(self, client: str, patience_s: float) -> None:
+        super().__init__(client)
+        self.patience_s = patience_s
+        self.deadline: asyncio.Timeout | None = None
+        self.last_s = asyncio.get_running_loop().time()
+
+    def progress(self) -> None:
+        self.last_s = asyncio.get_running_loop().time()
+        if self.deadline is not None:
+            self.deadline.reschedule(self.last_s + self.patience_s)
+
+    def end(self) -> None:
+        if self.deadline is not None and not self.deadline.expired():
+            self.deadline.reschedule(asyncio.get_running_loop().time())
+
+
+def _check_declared(request: Request, limit: int) -> None:
+    try:
+        declared = int(request.headers.get("content-length", 0))
+    except ValueError as error:
+        raise HTTPException(400, "Content-Length is not a number") from error
+    if declared > limit:
+        raise _too_large(limit)
+
+
+def _too_large(limit: int) -> HTTPException:
+    return HTTPException(413, f"the file is larger than {limit / 2**20:g} MiB")

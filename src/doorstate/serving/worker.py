@@ -1,0 +1,210 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Process that reads files and predicts; it is killed when it takes too long."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Callable
+from multiprocessing.connection import Connection
+from multiprocessing.context import SpawnProcess
+from typing import Any, NamedTuple
+
+from doorstate.errors import CloudContentError, DoorstateError
+from doorstate.inference.network_predictor import NetworkPredictor
+from doorstate.inference.predictor import Predictor
+from doorstate.inference.serialization import prediction_to_dict, require_points
+from doorstate.io.options import ReadOptions
+from doorstate.io.readers import parse_posed_cloud
+from doorstate.serving.request import format_parameter
+
+START_TIMEOUT_S = 60.0
+LOW_PRIORITY = 19
+
+LoadPredictor = Callable[[], Predictor]
+"""Function that loads the predictor of a worker; it is sent to the process, so it must be picklable."""
+
+
+class Job(NamedTuple):
+    """File to predict."""
+
+    content: bytes
+    suffix: str
+    options: ReadOptions
+
+
+class Reply(NamedTuple):
+    """HTTP status, and the prediction or the reason of an error."""
+
+    status: int
+    body: dict[str, Any]
+
+
+class Method(NamedTuple):
+    """Network or rule of a worker, to be named by the service."""
+
+    description: str
+    network: str | None = None
+    points: int | None = None
+    rule: str | None = None
+
+
+def error_reply(status: int, message: str) -> Reply:
+    """Return the reply of a job that failed."""
+    return Reply(status, {"error": message})
+
+
+class Worker:
+    """One process at a time, started when it is first needed, and again after it was killed.
+
+    Only one thread may use a worker at a time.
+
+    Args:
+        load: loads the predictor.
+        memory_bytes: memory for one file, above that of the loaded predictor; None sets no limit.
+        niceness: priority of the process, 0 as the service, 19 the lowest.
+    """
+
+    def __init__(self, load: LoadPredictor, memory_bytes: int | None = None, niceness: int = 0) -> None:
+        self._arguments = (load, memory_bytes, niceness)
+        self._lock = threading.Lock()  # between a start and `close`
+        self._closed = False
+        self._process: SpawnProcess | None = None
+
+    def start(self) -> None:
+        """Start the process, unless it runs; `run` starts it as well."""
+        with self._lock:
+            if self._process is None and not self._closed:
+                self._start()
+
+    def wait_until_ready(self) -> Method:
+        """Return the network or rule, once the process has loaded it.
+
+        Raises:
+            DoorstateError: the predictor cannot be loaded, or the process ended.
+        """
+        self.start()
+        if self._ready is None:
+            if not self._connection.poll(START_TIMEOUT_S):
+                raise DoorstateError("a worker did not start in time")
+            try:
+                message: Method | DoorstateError = self._connection.recv()
+            except (EOFError, OSError) as error:
+                raise DoorstateError("a worker process ended while it started") from error
+            if isinstance(message, DoorstateError):
+                raise message
+            self._ready = message
+        return self._ready
+
+    def run(self, job: Job, timeout_s: float) -> Reply:
+        """Predict a file; a process that fails or takes too long is replaced by a new one.
+
+        Args:
+            job: file to predict.
+            timeout_s: longest time, without the start of a new process.
+        """
+        try:
+            self.wait_until_ready()
+            self._connection.send((job.suffix, job.options))
+            self._connection.send_bytes(job.content)
+            if self._connection.poll(timeout_s):
+                reply: Reply = self._connection.recv()
+                return reply
+            problem = error_reply(504, f"the file took more than {timeout_s:g} s to process")
+        except (EOFError, OSError):
+            problem = error_reply(500, "the worker process ended while it processed the file")
+        except DoorstateError as error:
+            problem = error_reply(503, str(error))
+        self._restart()
+        return problem
+
+    def close(self) -> None:
+        """End the process."""
+        with self._lock:
+            self._closed = True
+            self._kill()
+
+    def _restart(self) -> None:
+        with self._lock:
+            self._kill()
+            if not self._closed:
+                self._start()
+
+    def _kill(self) -> None:
+        if self._process is not None:
+            self._process.kill()
+            self._process.join()
+            self._connection.close()
+            self._process = None
+
+    def _start(self) -> None:
+        # spawn: a forked child of a process with threads can hang.
+        context = multiprocessing.get_context("spawn")
+        self._connection, child = context.Pipe()
+        self._process = context.Process(
+            target=_serve_jobs, args=(child, *self._arguments), name="doorstate-worker", daemon=True
+        )
+        self._process.start()
+        child.close()
+        self._ready: Method | None = None
+
+
+def _serve_jobs(connection: Connection, load: LoadPredictor, memory_bytes: int | None, niceness: int) -> None:
+    """Reply to jobs until the connection is closed; runs in the process of a worker."""
+    for number in (signal.SIGINT, signal.SIGTERM):  # the service handles them, and then ends its workers
+        signal.signal(number, signal.SIG_IGN)
+    if niceness:
+        os.nice(niceness)
+    try:
+        predictor = load()
+        predictor.warm_up()
+    except DoorstateError as error:
+        connection.send(error)
+        return
+    if memory_bytes is not None:
+        _limit_memory(memory_bytes)
+    connection.send(_method(predictor))
+    while True:
+        try:
+            suffix, options = connection.recv()
+            content = connection.recv_bytes()
+        except (EOFError, OSError):
+            return
+        connection.send(predict_file(predictor, Job(content, suffix, options)))
+
+
+def _method(predictor: Predictor) -> Method:
+    if isinstance(predictor, NetworkPredictor):
+        return Method(str(predictor), network=predictor.name, points=predictor.num_points)
+    return Method(str(predictor), rule=predictor.name)
+
+
+def predict_file(predictor: Predictor, job: Job) -> Reply:
+    """Read a file and predict it; every error is a reply."""
+    try:
+        cloud, pose = parse_posed_cloud(job.content, job.suffix, job.options)
+        prediction = prediction_to_dict(require_points(predictor(cloud)), format_parameter)
+        return Reply(200, prediction | {"sensor_pose": pose.to_dict()})
+    except CloudContentError as error:
+        return error_reply(422, error.describe(format_parameter, with_path=False))
+    except DoorstateError as error:
+        return error_reply(400, error.describe(format_parameter, with_path=False))
+    except MemoryError:
+        return error_reply(413, "the file needs too much memory")
+    except Exception as error:  # a worker outlives a fault in one file
+        return error_reply(500, f"internal error ({type(error).__name__}): see the log of the service")
+
+
+def _limit_memory(memory_bytes: int) -> None:
+    """Let this process map so much more memory than it has mapped now."""
+    try:
+        import resource  # not on Windows
+        from pathlib import Path
+
+        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
+    except (ImportError, OSError):
+        return
+    limit = pages * resource.getpagesize() + memory_bytes
+    resource.setrlimit(resource.RLIMIT_AS, (limit, resource.getrlimit(resource.RLIMIT_AS)[1]))
