@@ -60,7 +60,12 @@ class MeanPredictor(Predictor):
             raise ZeroDivisionError
         points = self.prepare(cloud).points
         p = float(np.clip(np.abs(points).mean() / 10, 0.01, 0.9))
-        return Prediction(DoorState.CLOSED, dict(zip(STATES, (1 - p, p, 0.0), strict=True)), len(points), 1.0)
+        return Prediction(
+            DoorState.CLOSED,
+            raw_probabilities=dict(zip(STATES, (1 - p, p, 0.0), strict=True)),
+            num_points=len(points),
+            milliseconds=1.0,
+        )
 
 
 WAIT, SLEEP, CRASH, TAKE_MEMORY, FAULT = 90.0, 91.0, 92.0, 93.0, 94.0

@@ -58,11 +58,6 @@ class GuardedProtocol(H11Protocol):
         else:
             self._got_head()
 
-    def on_response_complete(self) -> None:
-        super().on_response_complete()
-        if not self.transport.is_closing() and self.conn.trailing_data[0]:
-            self._expect_head()
-
     def connection_lost(self, exc: Exception | None) -> None:
         self._got_head()
         if self._counted:

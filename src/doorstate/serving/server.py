@@ -6,13 +6,14 @@ from __future__ import annotations
 import math
 import signal
 import socket
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import uvicorn
 
 from doorstate.errors import DoorstateError
 from doorstate.serving.connections import guarded_protocol
 from doorstate.serving.limits import Limits
+from doorstate.serving.logs import log_config
 
 if TYPE_CHECKING:
     from fastapi import FastAPI
@@ -50,26 +51,6 @@ def stop_on_signals(server: uvicorn.Server) -> None:
     # Uvicorn stops at these signals, and raises them again when it has stopped, which would look like a failure.
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: setattr(server, "should_exit", True))
-
-
-def log_config(verbose: bool) -> dict[str, Any]:
-    """Return the configuration of the loggers: lines with date and time on standard error."""
-    return {
-        "version": 1,
-        "disable_existing_loggers": False,
-        "formatters": {
-            "dated": {
-                "format": "%(asctime)s.%(msecs)03d %(levelname)s %(message)s",
-                "datefmt": "%Y-%m-%dT%H:%M:%S",
-            }
-        },
-        "handlers": {
-            "stderr": {"class": "logging.StreamHandler", "formatter": "dated", "stream": "ext://sys.stderr"}
-        },
-        "loggers": {
-            "uvicorn": {"handlers": ["stderr"], "level": "INFO" if verbose else "WARNING", "propagate": False}
-        },
-    }
 
 
 def listen(host: str, port: int) -> socket.socket:

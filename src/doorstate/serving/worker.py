@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import logging
+import logging.config
 import multiprocessing
 import os
 import signal
@@ -18,10 +20,12 @@ from doorstate.inference.predictor import Predictor
 from doorstate.inference.serialization import prediction_to_dict, require_points
 from doorstate.io.options import ReadOptions
 from doorstate.io.readers import parse_posed_cloud
+from doorstate.serving.logs import log_config
 from doorstate.serving.request import format_parameter
 
 START_TIMEOUT_S = 60.0
 LOW_PRIORITY = 19
+_LOG = logging.getLogger("doorstate.serving")
 
 LoadPredictor = Callable[[], Predictor]
 """Function that loads the predictor of a worker; it is sent to the process, so it must be picklable."""
@@ -72,6 +76,7 @@ class Worker:
         self._lock = threading.Lock()  # between a start and `close`
         self._closed = False
         self._process: SpawnProcess | None = None
+        self._ready: Method | None = None
 
     def start(self) -> None:
         """Start the process, unless it runs; `run` starts it as well."""
@@ -148,7 +153,7 @@ class Worker:
         )
         self._process.start()
         child.close()
-        self._ready: Method | None = None
+        self._ready = None
 
 
 def _serve_jobs(connection: Connection, load: LoadPredictor, memory_bytes: int | None, niceness: int) -> None:
@@ -157,6 +162,7 @@ def _serve_jobs(connection: Connection, load: LoadPredictor, memory_bytes: int |
         signal.signal(number, signal.SIG_IGN)
     if niceness:
         os.nice(niceness)
+    logging.config.dictConfig(log_config(verbose=False))
     try:
         predictor = load()
         predictor.warm_up()
@@ -194,6 +200,7 @@ def predict_file(predictor: Predictor, job: Job) -> Reply:
     except MemoryError:
         return error_reply(413, "the file needs too much memory")
     except Exception as error:  # a worker outlives a fault in one file
+        _LOG.exception("fault in a file of %d bytes, %s", len(job.content), job.suffix)
         return error_reply(500, f"internal error ({type(error).__name__}): see the log of the service")
 
 
