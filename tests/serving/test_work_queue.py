@@ -57,7 +57,7 @@ def test_full_queue_and_slow_worker(tmp_path: Path) -> None:
 
 
 def test_worker_that_takes_too_long_or_ends_is_replaced() -> None:
-    with serving(work_timeout_s=1.5) as client:
+    with serving(quick_timeout_s=1.0, work_timeout_s=1.5) as client:
         error_of(client.post("/predict?format=npy", content=order(SLEEP)), 504)
         assert client.post("/predict?format=npy", content=NPY).status_code == 200
         error_of(client.post("/predict?format=npy", content=order(CRASH)), 500)

@@ -14,6 +14,7 @@ from fastapi.responses import HTMLResponse, JSONResponse, PlainTextResponse
 from doorstate import __version__
 from doorstate.serving.access import Access, AccessControl
 from doorstate.serving.api_page import render_api_page
+from doorstate.serving.body import BODY_HEADERS
 from doorstate.serving.errors import STATUS_DESCRIPTIONS, add_error_handlers
 from doorstate.serving.lingering_close import LingeringClose
 from doorstate.serving.metrics import CONTENT_TYPE, CountRequests, Metrics
@@ -112,7 +113,8 @@ def create_app(queue: WorkQueue, access: Access | None = None) -> FastAPI:
         openapi_extra={"requestBody": _REQUEST_BODY},
     )
     async def predict(request: Request, query: Annotated[PredictQuery, Query()]) -> Response:
-        options, suffix = query.read_options(), query.suffix(request.headers.get("content-type", ""))
+        options, suffix = query.read_options(), query.suffix()
+        headers = {name: request.headers.get(name, "") for name in BODY_HEADERS}
         queue.check_space()
         limit_s, problem = queue.limits.timeout_s, "the upload was not complete"
         upload = None
@@ -120,7 +122,8 @@ def create_app(queue: WorkQueue, access: Access | None = None) -> FastAPI:
             async with asyncio.timeout(limit_s):
                 upload = await uploads.read(request)
                 problem = "there was no result"
-                reply = await queue.run(Job(bytes(upload.content), suffix, options))
+                job = Job(bytes(upload.content), headers, suffix, options)
+                reply = await queue.run(job, upload.client)
         except TimeoutError as error:
             raise HTTPException(504, f"{problem} after {limit_s:g} s") from error
         finally:

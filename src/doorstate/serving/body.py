@@ -12,6 +12,8 @@ from fastapi import HTTPException
 
 from doorstate.io.formats import CLOUD_SUFFIXES, format_suffix, suffix_of_content, unpack_at_most
 
+BODY_HEADERS = ("content-encoding", "content-type")
+"""Headers that say how a body is to be read."""
 _FORM = "multipart/form-data"
 _MAX_PARTS, _MAX_PART_HEADER = 16, 1 << 13
 _SUFFIX_OF_SUBTYPE = {"plain": ".txt"}  # media subtypes that differ from the suffix

@@ -18,6 +18,7 @@ class Limits:
         queue: number of complete files that wait for a worker.
         workers: number of files that are processed at the same time, each in a process.
         work_timeout_s: time to read and predict one file; a worker that takes longer is killed.
+        quick_timeout_s: time after which a file is taken for large, and started again as such.
         large_bytes: files from this size on have one more worker, of low priority, to themselves.
         head_timeout_s: time for the head of a request.
         stall_timeout_s: time between two parts of an upload.
@@ -32,6 +33,7 @@ class Limits:
     queue: int = 16
     workers: int = field(default_factory=default_workers)
     work_timeout_s: float = 10.0
+    quick_timeout_s: float = 2.0
     large_bytes: int = 4 * 2**20
     head_timeout_s: float = 5.0
     stall_timeout_s: float = 3.0

@@ -6,6 +6,7 @@ from __future__ import annotations
 import asyncio
 import queue
 import threading
+import time
 from concurrent.futures import ThreadPoolExecutor
 
 from fastapi import HTTPException
@@ -13,12 +14,14 @@ from fastapi import HTTPException
 from doorstate.serving.limits import Limits
 from doorstate.serving.worker import LOW_PRIORITY, Job, LoadPredictor, Method, Reply, Worker
 
+_SLOW_S = 60.0
+
 
 class WorkQueue:
     """Worker processes and the files that wait for them, for one event loop.
 
     A large file takes long to read. It goes to one more worker, of low priority, so that any number of them slows the
-    others by a few percent. That worker starts with the first large file.
+    others by a few percent; so does a small file that turns out to take long. That worker starts with the first one.
 
     Args:
         load: loads the predictor, in each worker.
@@ -27,17 +30,28 @@ class WorkQueue:
 
     def __init__(self, load: LoadPredictor, limits: Limits) -> None:
         self.limits = limits
-        self._quick = _Lane([Worker(load, limits.memory_bytes) for _ in range(limits.workers)], limits.queue)
-        self._large = _Lane([Worker(load, limits.memory_bytes, LOW_PRIORITY)], max(1, limits.queue // 8))
+        self._slow_until: dict[str, float] = {}  # by address
+        self._quick = _Lane([Worker(load, limits) for _ in range(limits.workers)], limits.queue)
+        self._large = _Lane([Worker(load, limits, LOW_PRIORITY)], max(1, limits.queue // 8))
 
-    async def run(self, job: Job) -> Reply:
+    async def run(self, job: Job, client: str) -> Reply:
         """Return the reply of a worker.
+
+        Args:
+            job: file to predict.
+            client: address of the client; after a file that took long, its next files are taken for large.
 
         Raises:
             HTTPException: 503, too many files wait.
         """
-        lane = self._large if len(job.content) >= self.limits.large_bytes else self._quick
-        return await lane.run(job, self.limits.work_timeout_s)
+        now = time.monotonic()
+        if len(job.content) < self.limits.large_bytes and self._slow_until.get(client, 0.0) < now:
+            reply = await self._quick.run(job, min(self.limits.quick_timeout_s, self.limits.work_timeout_s))
+            if reply.status != 504:
+                return reply
+            self._slow_until = {name: until for name, until in self._slow_until.items() if until > now}
+            self._slow_until[client] = now + _SLOW_S
+        return await self._large.run(job, self.limits.work_timeout_s)
 
     def check_space(self) -> None:
         """Refuse an upload that would have to wait with too many others.

@@ -9,10 +9,12 @@ import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
 from typing import Any, NamedTuple
+
+from fastapi import HTTPException
 
 from doorstate.errors import CloudContentError, DoorstateError
 from doorstate.inference.network_predictor import NetworkPredictor
@@ -20,6 +22,8 @@ from doorstate.inference.predictor import Predictor
 from doorstate.inference.serialization import prediction_to_dict, require_points
 from doorstate.io.options import ReadOptions
 from doorstate.io.readers import parse_posed_cloud
+from doorstate.serving.body import read_body
+from doorstate.serving.limits import Limits
 from doorstate.serving.logs import log_config
 from doorstate.serving.request import format_parameter
 
@@ -34,8 +38,9 @@ LoadPredictor = Callable[[], Predictor]
 class Job(NamedTuple):
     """File to predict."""
 
-    content: bytes
-    suffix: str
+    content: bytes  # body of the request
+    headers: Mapping[str, str]  # those of `BODY_HEADERS`
+    suffix: str | None  # format; None finds it out
     options: ReadOptions
 
 
@@ -67,12 +72,12 @@ class Worker:
 
     Args:
         load: loads the predictor.
-        memory_bytes: memory for one file, above that of the loaded predictor; None sets no limit.
+        limits: sizes and memory of files.
         niceness: priority of the process, 0 as the service, 19 the lowest.
     """
 
-    def __init__(self, load: LoadPredictor, memory_bytes: int | None = None, niceness: int = 0) -> None:
-        self._arguments = (load, memory_bytes, niceness)
+    def __init__(self, load: LoadPredictor, limits: Limits, niceness: int = 0) -> None:
+        self._arguments = (load, limits, niceness)
         self._lock = threading.Lock()  # between a start and `close`
         self._closed = False
         self._process: SpawnProcess | None = None
@@ -112,7 +117,7 @@ class Worker:
         """
         try:
             self.wait_until_ready()
-            self._connection.send((job.suffix, job.options))
+            self._connection.send(job[1:])
             self._connection.send_bytes(job.content)
             if self._connection.poll(timeout_s):
                 reply: Reply = self._connection.recv()
@@ -156,7 +161,7 @@ class Worker:
         self._ready = None
 
 
-def _serve_jobs(connection: Connection, load: LoadPredictor, memory_bytes: int | None, niceness: int) -> None:
+def _serve_jobs(connection: Connection, load: LoadPredictor, limits: Limits, niceness: int) -> None:
     """Reply to jobs until the connection is closed; runs in the process of a worker."""
     for number in (signal.SIGINT, signal.SIGTERM):  # the service handles them, and then ends its workers
         signal.signal(number, signal.SIG_IGN)
@@ -169,16 +174,16 @@ def _serve_jobs(connection: Connection, load: LoadPredictor, memory_bytes: int |
     except DoorstateError as error:
         connection.send(error)
         return
-    if memory_bytes is not None:
-        _limit_memory(memory_bytes)
+    if limits.memory_bytes is not None:
+        _limit_memory(limits.memory_bytes)
     connection.send(_method(predictor))
     while True:
         try:
-            suffix, options = connection.recv()
+            description = connection.recv()
             content = connection.recv_bytes()
         except (EOFError, OSError):
             return
-        connection.send(predict_file(predictor, Job(content, suffix, options)))
+        connection.send(predict_file(predictor, Job(content, *description), limits.max_bytes))
 
 
 def _method(predictor: Predictor) -> Method:
@@ -187,12 +192,15 @@ def _method(predictor: Predictor) -> Method:
     return Method(str(predictor), rule=predictor.name)
 
 
-def predict_file(predictor: Predictor, job: Job) -> Reply:
-    """Read a file and predict it; every error is a reply."""
+def predict_file(predictor: Predictor, job: Job, max_bytes: int) -> Reply:
+    """Read a file of at most `max_bytes` unpacked and predict it; every error is a reply."""
     try:
-        cloud, pose = parse_posed_cloud(job.content, job.suffix, job.options)
+        file = read_body(job.content, job.headers, max_bytes)
+        cloud, pose = parse_posed_cloud(file.content, job.suffix or file.suffix, job.options)
         prediction = prediction_to_dict(require_points(predictor(cloud)), format_parameter)
         return Reply(200, prediction | {"sensor_pose": pose.to_dict()})
+    except HTTPException as error:
+        return error_reply(error.status_code, error.detail)
     except CloudContentError as error:
         return error_reply(422, error.describe(format_parameter, with_path=False))
     except DoorstateError as error:
@@ -200,7 +208,7 @@ def predict_file(predictor: Predictor, job: Job) -> Reply:
     except MemoryError:
         return error_reply(413, "the file needs too much memory")
     except Exception as error:  # a worker outlives a fault in one file
-        _LOG.exception("fault in a file of %d bytes, %s", len(job.content), job.suffix)
+        _LOG.exception("fault in a file of %d bytes, format %s", len(job.content), job.suffix)
         return error_reply(500, f"internal error ({type(error).__name__}): see the log of the service")
 
 
