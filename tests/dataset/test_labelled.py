@@ -10,9 +10,10 @@ import pytest
 from PIL import Image
 
 from doorstate.dataset.class_folders import label_of_folder
-from doorstate.dataset.labelled import INDEX, check_column, labelled_frames
+from doorstate.dataset.labelled import check_column, labelled_frames
 from doorstate.errors import CameraError, CloudReadError, ConfigError, DatasetError
 from doorstate.io.camera import Pinhole
+from doorstate.io.find import INDEX_FILE
 from doorstate.io.options import ReadOptions
 from doorstate.types import NO_DOOR, STATES
 from tests.error_fields import about
@@ -41,7 +42,7 @@ def write(root: Path, *names: str) -> Path:
 
 
 def index(root: Path, text: str) -> Path:
-    (root / INDEX).write_text(text, encoding="utf-8")
+    (root / INDEX_FILE).write_text(text, encoding="utf-8")
     return root
 
 
@@ -119,7 +120,7 @@ def test_an_invalid_index_is_refused_with_its_column(
 ) -> None:
     with pytest.raises(error) as refused:
         labelled_frames(index(write(tmp_path, "a.xyz"), text))
-    assert (refused.value.path, refused.value.field) == (tmp_path / INDEX, field)
+    assert (refused.value.path, refused.value.field) == (tmp_path / INDEX_FILE, field)
     assert "\n" not in str(refused.value)
 
 
@@ -139,7 +140,7 @@ def test_a_missing_column_is_refused(tmp_path: Path) -> None:
     assert "door, light" in str(refused.value.hint)
 
 
-@pytest.mark.skipif(not (REAL / INDEX).is_file(), reason="the recorded frames are not here")
+@pytest.mark.skipif(not (REAL / INDEX_FILE).is_file(), reason="the recorded frames are not here")
 def test_the_recorded_frames_can_be_read() -> None:
     frames = labelled_frames(REAL)
     labels = {frame.label for frame in frames}

@@ -13,6 +13,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from doorstate.dataset.frame_index import IndexedOptions
+from doorstate.dataset.labelled import labelled_frames
 from doorstate.errors import ConfigError, DatasetError
 from doorstate.io.options import ReadOptions
 from doorstate.io.readers import read_cloud
@@ -75,6 +77,21 @@ def test_raw_files_are_written_on_request(tmp_path: Path) -> None:
         with Image.open(tmp_path / "image" / row.state / f"{row.sample_id}.png") as picture:
             assert (picture.size, picture.mode) == ((640, 480), "RGB")
     assert len(list(tmp_path.rglob("*.p[cn][dg]"))) == 9
+
+
+def test_depth_images_are_read_as_they_were_rendered_by_the_index_beside_them(tmp_path: Path) -> None:
+    settings = SimulationSettings(preset=PRESETS["varied"], seed=1, poses=1, raw=("depth",))
+    rows = [unflatten(line) for line in simulate_dataset(tmp_path, settings, 1)]
+    assert all(row.pitch_deg and row.roll_deg for row in rows)
+    by_file = {frame.file: frame for frame in labelled_frames(tmp_path / "depth")}
+    indexed = IndexedOptions(ReadOptions())
+    for row in rows:
+        frame = replay(row)
+        labelled = by_file[f"{row.state}/{row.sample_id}.png"]
+        points = read_cloud(labelled.folder / labelled.file, indexed.of(labelled.folder / labelled.file))
+        np.testing.assert_array_equal(points, labelled.read())
+        assert labelled.label == row.state
+        assert np.nanmax(np.abs(points - frame.points)) < 1.5e-3  # of depth that is rounded to 1 mm
 
 
 def test_a_stopped_simulation_continues_with_the_missing_pieces(tmp_path: Path) -> None:

@@ -28,6 +28,7 @@ from doorstate.cli.reading_options import with_reading_options
 from doorstate.errors import CloudReadError, ConfigError, DoorstateError
 
 if TYPE_CHECKING:
+    from doorstate.dataset.frame_index import IndexedOptions
     from doorstate.inference.predictor import Predictor
     from doorstate.io.options import ReadOptions
     from doorstate.io.sensor_pose import PosedCloud
@@ -74,6 +75,7 @@ def predict(
     """
     from doorstate.cli.predict_bag import predict_bag
     from doorstate.cli.predictors import Methods, load_predictors
+    from doorstate.dataset.frame_index import IndexedOptions
 
     check_source(files, bag)
     if bag is None and (topic, camera_info_topic, every) != (None, None, 1):
@@ -98,7 +100,8 @@ def predict(
         return
     sources = _find(files or [])
     predictors = load_predictors(methods, points, budget_ms=budget_ms, threads=threads)
-    clouds = (_predict_file(predictors, source, options) for source in sources)
+    indexed = IndexedOptions(options)
+    clouds = (_predict_file(predictors, source, indexed) for source in sources)
     names = [_name(source) for source in sources if isinstance(source, Path)]
     Output("file", "file", out, as_json).write(clouds, list(predictors), names, len(sources))
 
@@ -119,7 +122,7 @@ def _find(paths: list[Path]) -> list[Path | CloudReadError]:
 
 
 def _predict_file(
-    predictors: Mapping[str, Predictor], source: Path | CloudReadError, options: ReadOptions
+    predictors: Mapping[str, Predictor], source: Path | CloudReadError, options: IndexedOptions
 ) -> Rows:
     from doorstate.io.readers import read_posed_cloud
 
@@ -129,7 +132,7 @@ def _predict_file(
         ]
     row = {"file": _name(source)}
     try:
-        return [*_predict(predictors, read_posed_cloud(source, options), row)]
+        return [*_predict(predictors, read_posed_cloud(source, options.of(source)), row)]
     except DoorstateError as error:
         return [row | {"error": error.describe(format_flag, with_path=False)}]
     except MemoryError:

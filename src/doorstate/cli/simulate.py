@@ -55,8 +55,9 @@ def simulate(
 ) -> None:
     """Simulate doors seen by a depth camera.
 
-    The folder gets a manifest with one row for each cloud; every cloud can be rebuilt from its row. An interrupted
-    simulation continues where it stopped.
+    The folder gets a manifest with one row for each cloud; every cloud can be rebuilt from its row. Depth images get an
+    index.csv with their camera, from which predict and evaluate read them. An interrupted simulation continues where
+    it stopped.
 
     \b
     Examples:

@@ -1,95 +1,172 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`index.csv` of recorded frames: one line a file, with its label, and its camera where known.
+"""`index.csv` of frames: one line a file, with its camera where known, and its label.
 
-Columns `file` and `state` are required. `fx`, `fy`, `cx`, `cy`, `width`, `height` (pixels), `depth_unit_m`, `axes`,
-`roll_deg`, `pitch_deg` and `quaternion` override the read options of that file; an empty text or `?` is unknown.
-Further columns are kept.
+Column `file` is required, for labelled frames `state` too. `fx`, `fy`, `cx`, `cy`, `width`, `height` (pixels),
+`depth_unit_m`, `axes`, `roll_deg`, `pitch_deg` and `quaternion` override the read options of that file; an empty text
+or `?` is unknown. Further columns are kept. Files are inside the folder of the index.
 """
 
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from doorstate._files import read_csv
+from doorstate._paths import resolve_inside
 from doorstate.dataset.class_folders import label_of_folder
-from doorstate.errors import DatasetError
+from doorstate.errors import CameraError, DatasetError, DoorstateError
 from doorstate.io.camera import Intrinsics, Pinhole
+from doorstate.io.find import INDEX_FILE
 from doorstate.io.options import ReadOptions
 from doorstate.io.rotations import parse_quaternion
 
-INDEX = "index.csv"
 _NUMBERS = {"depth_unit_m": "depth_scale_m", "roll_deg": "roll_deg", "pitch_deg": "pitch_deg"}
 _CAMERA = ("fx", "fy", "cx", "cy")
 _UNKNOWN = ("", "?")
+_LEVELS = (
+    3  # folders above a file in which its index is looked for: below them are Depth/Test/Closed and the like
+)
 
 
 def read_index(folder: Path, options: ReadOptions) -> list[tuple[dict[str, str], ReadOptions]]:
-    """Return the lines of the index and the read options of each file.
+    """Return the lines of labelled frames, and the read options of each file.
 
     Raises:
-        DatasetError: a line is invalid.
-        CameraError: impossible intrinsics or units.
+        DatasetError: a line is invalid, or names a file that does not exist or is outside of the folder.
+        CameraError: impossible intrinsics, units or rotations.
     """
-    index = folder / INDEX
-    rows = read_csv(index)
+    index = folder / INDEX_FILE
+    rows = _read_rows(index, ("file", "state"))
     if not rows:
         raise DatasetError("has no lines", path=index)
-    for column in ("file", "state"):
-        if column not in rows[0]:
-            raise DatasetError(f"has no column {column!r}", path=index, field=column)
-    entries: dict[str, tuple[dict[str, str], ReadOptions]] = {}
+    entries = []
     for number, row in enumerate(rows, start=2):
-        name, state = row["file"], row["state"].strip()
-        if not name or not state:
-            raise _invalid(index, number, "has no value", "state" if name else "file")
-        if name in entries:
-            raise _invalid(index, number, f"repeats {name!r}", "file")
-        if not (folder / name).is_file():
-            raise _invalid(index, number, f"no file {name!r} in the folder", "file")
+        state = row["state"].strip()
+        if not state:
+            raise _invalid(index, number, "has no value", "state")
+        if not (folder / row["file"]).is_file():
+            raise _invalid(index, number, f"no file {row['file']!r} in the folder", "file")
         line = row | {"state": label_of_folder(state) or state}
-        entries[name] = (line, _options(row, options, index, number))
-    return list(entries.values())
+        entries.append((line, _options(row, options, index, number)))
+    return entries
+
+
+class IndexedOptions:
+    """Read options of files, changed by the index in the folder of a file or in one of the two folders above.
+
+    Args:
+        options: options of files that no index names.
+    """
+
+    def __init__(self, options: ReadOptions) -> None:
+        self._options = options
+        self._indexes: dict[Path, dict[Path, ReadOptions] | DoorstateError] = {}
+
+    def of(self, path: Path) -> ReadOptions:
+        """Return the options of a file.
+
+        Raises:
+            DatasetError: the index is damaged, or a line of it is invalid.
+            CameraError: impossible intrinsics, units or rotations.
+        """
+        path = _normalized(path)
+        for folder in path.parents[:_LEVELS]:
+            if folder not in self._indexes:
+                self._indexes[folder] = self._read(folder)
+            index = self._indexes[folder]
+            if isinstance(index, DoorstateError):
+                raise index
+            if path in index:
+                return index[path]
+        return self._options
+
+    def _read(self, folder: Path) -> dict[Path, ReadOptions] | DoorstateError:
+        index = folder / INDEX_FILE
+        if not index.is_file():
+            return {}
+        try:
+            return {
+                _normalized(folder / row["file"]): _options(row, self._options, index, number)
+                for number, row in enumerate(_read_rows(index, ("file",)), start=2)
+            }
+        except DoorstateError as error:
+            return error
+
+
+def _normalized(path: Path) -> Path:
+    return Path(os.path.normpath(path.absolute()))
+
+
+def _read_rows(index: Path, columns: tuple[str, ...]) -> list[dict[str, str]]:
+    """Return the lines of an index with these columns, each with a file of its own inside the folder."""
+    rows = read_csv(index)
+    names: set[str] = set()
+    for number, row in enumerate(rows, start=2):
+        for column in columns:
+            if column not in row:
+                raise DatasetError(f"has no column {column!r}", path=index, field=column)
+        name = row["file"]
+        if not name:
+            raise _invalid(index, number, "has no value", "file")
+        if name in names:
+            raise _invalid(index, number, f"repeats {name!r}", "file")
+        names.add(name)
+        for column in ("file", "rgb"):
+            try:
+                resolve_inside(index.parent, row.get(column, ""))
+            except DatasetError as error:
+                raise _invalid(index, number, error.message, column) from error
+    return rows
 
 
 def _invalid(index: Path, number: int, problem: str, column: str) -> DatasetError:
-    return DatasetError(f"line {number} {problem}", path=index, field=column)
+    return DatasetError(f"line {number}: {problem}", path=index, field=column)
 
 
 def _options(row: Mapping[str, str], options: ReadOptions, index: Path, number: int) -> ReadOptions:
     """Return the options with the values of a line."""
-
-    def value(column: str) -> float | None:
-        return _number(row, column, index, number)
-
-    camera = {name: value(name) for name in _CAMERA}
-    missing = [name for name, parameter in camera.items() if parameter is None]
-    if missing and len(missing) < len(_CAMERA):
-        raise _invalid(index, number, "needs fx, fy, cx and cy together", missing[0])
-    if not missing:
-        intrinsics = [parameter for parameter in camera.values() if parameter is not None]
-        width, height = value("width"), value("height")
-        if width is None or height is None:
-            options = replace(options, intrinsics=Pinhole(*intrinsics))
-        else:
-            # With a size, images of another size are refused.
-            options = replace(
-                options, intrinsics=Intrinsics(round(width), round(height), *Pinhole(*intrinsics))
-            )
-    changes: dict[str, Any] = {}
-    for column, field in _NUMBERS.items():
-        if (number_of_column := value(column)) is not None:
-            changes[field] = number_of_column
-    if (axes := row.get("axes", "").strip()) not in _UNKNOWN:
-        changes["axes"] = axes
+    values = {
+        column: _number(row, column, index, number) for column in (*_CAMERA, "width", "height", *_NUMBERS)
+    }
     if row.get("frame", "").strip() in ("body", "optical"):
         raise _invalid(index, number, "names axes in another column than `axes`", "frame")
-    if (quaternion := row.get("quaternion", "").strip()) not in _UNKNOWN:
-        changes |= {"quaternion": parse_quaternion(quaternion), "roll_deg": 0.0, "pitch_deg": 0.0}
-    return replace(options, **changes)
+    try:
+        changes: dict[str, Any] = {
+            field: values[column] for column, field in _NUMBERS.items() if values[column] is not None
+        }
+        if (camera := _camera(values, index, number)) is not None:
+            changes["intrinsics"] = camera
+        if (axes := row.get("axes", "").strip()) not in _UNKNOWN:
+            changes["axes"] = axes
+        if (quaternion := row.get("quaternion", "").strip()) not in _UNKNOWN:
+            changes |= {"roll_deg": 0.0, "pitch_deg": 0.0, "quaternion": parse_quaternion(quaternion)}
+        elif "roll_deg" in changes or "pitch_deg" in changes:
+            changes["quaternion"] = None
+        return replace(options, **changes)
+    except CameraError as error:
+        raise CameraError(
+            f"line {number}: {error.message}", path=index, field=error.field, expected=error.expected
+        ) from error
+
+
+def _camera(values: Mapping[str, float | None], index: Path, number: int) -> Intrinsics | Pinhole | None:
+    """Return the camera of a line; with a size, images of another size are refused."""
+    missing = [name for name in _CAMERA if values[name] is None]
+    if len(missing) == len(_CAMERA):
+        return None
+    if missing:
+        raise _invalid(index, number, "needs fx, fy, cx and cy together", missing[0])
+    pinhole = Pinhole(*(values[name] or 0.0 for name in _CAMERA))
+    width, height = values["width"], values["height"]
+    if width is None or height is None:
+        return pinhole
+    if not (width.is_integer() and height.is_integer()):
+        raise _invalid(index, number, f"has {width:g} x {height:g} pixels", "width")
+    return Intrinsics(int(width), int(height), *pinhole)
 
 
 def _number(row: Mapping[str, str], column: str, index: Path, number: int) -> float | None:
@@ -101,5 +178,5 @@ def _number(row: Mapping[str, str], column: str, index: Path, number: int) -> fl
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise _invalid(index, number, f"has {text!r}, which is not a number,", column)
+        raise _invalid(index, number, f"{text[:40]!r} is not a number", column)
     return value

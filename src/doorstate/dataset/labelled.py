@@ -9,10 +9,10 @@ from functools import partial
 from pathlib import Path
 
 from doorstate.dataset.class_folders import file_row, label_of_folder, nearest_label
-from doorstate.dataset.frame_index import INDEX, read_index
+from doorstate.dataset.frame_index import read_index
 from doorstate.dataset.layouts import find_layout
 from doorstate.errors import DatasetError, unknown_name
-from doorstate.io.find import find_clouds
+from doorstate.io.find import INDEX_FILE, find_clouds
 from doorstate.io.options import DEFAULT_OPTIONS, ReadOptions
 from doorstate.io.readers import read_cloud
 from doorstate.types import Points
@@ -53,7 +53,7 @@ def labelled_frames(
         return [_frame(folder, row, partial(published.read, folder / row["file"], options)) for row in rows]
     if not folder.is_dir():
         raise DatasetError("is not a folder", path=folder)
-    if (folder / INDEX).is_file():
+    if (folder / INDEX_FILE).is_file():
         return [
             _frame(folder, row, partial(read_cloud, folder / row["file"], row_options))
             for row, row_options in read_index(folder, options)
@@ -62,7 +62,7 @@ def labelled_frames(
     rows = [file_row(folder, path, label) for path, label in labels.items() if label is not None]
     if not rows:
         raise DatasetError(
-            f"has no {INDEX} and no clouds in folders named after states",
+            f"has no {INDEX_FILE} and no clouds in folders named after states",
             path=folder,
             expected="folders such as closed, semi-open, open, no-door",
         )

@@ -12,6 +12,7 @@ from doorstate import __version__
 from doorstate._files import is_vacant, read_csv, write_csv
 from doorstate._jobs import Progress, Shard, default_workers, no_progress, piece_paths, run_pieces
 from doorstate._locks import owned_folder
+from doorstate.dataset.frame_index import IndexedOptions
 from doorstate.dataset.layouts import find_layout
 from doorstate.dataset.pieces import PieceClouds, SavedPieces
 from doorstate.dataset.preparation import CLAIM, Preparation
@@ -157,6 +158,7 @@ def _release(folder: Path) -> None:
 def _prepare_piece(piece: _Piece, path: Path) -> None:
     preparation = piece.preparation
     read = read_cloud if preparation.layout is None else find_layout(preparation.layout).read
+    indexed = IndexedOptions(preparation.options)
     is_simulated = preparation.is_simulated
     clouds = PieceClouds(preparation.spec.num_points)
     for row in piece.rows:
@@ -164,7 +166,9 @@ def _prepare_piece(piece: _Piece, path: Path) -> None:
             if is_simulated:
                 clouds.add(*sample_frame(_replay(row), preparation.spec))
             else:
-                points = read(preparation.source / row["file"], preparation.options)
+                file = preparation.source / row["file"]
+                options = indexed.of(file) if preparation.layout is None else preparation.options
+                points = read(file, options)
                 clouds.add(sample_cloud(points, preparation.spec).points)
         except (CloudError, CameraError) as error:
             clouds.reject(error.describe(with_path=False))

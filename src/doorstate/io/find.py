@@ -11,7 +11,8 @@ from doorstate.errors import CloudReadError
 from doorstate.io.formats import BAG_SUFFIXES, CLOUD_SUFFIXES, OPEN_BAG_HINT, format_suffix
 
 _PREPARED = "dataset.json"  # dataset.store
-_TABLES = ("index.csv", "manifest.csv", "predictions.csv", "rejected.csv")
+INDEX_FILE = "index.csv"  # dataset.frame_index
+_TABLES = (INDEX_FILE, "manifest.csv", "predictions.csv", "rejected.csv")
 
 
 def find_clouds(paths: Sequence[Path]) -> list[Path]:

@@ -2,7 +2,7 @@
 """Simulated data sets on disk: `simulation.json`, `manifest.csv`, and raw files on request.
 
 The manifest is the data set: `frames.replay` rebuilds the cloud of a row. Raw clouds, depth images and pictures are for
-other tools.
+other tools; an `index.csv` beside the depth images holds their camera and its tilt (`dataset.frame_index`).
 """
 
 from __future__ import annotations
@@ -23,9 +23,10 @@ from doorstate._input import MAX_SETTINGS_BYTES
 from doorstate._jobs import Progress, Shard, default_workers, no_progress, piece_paths, run_pieces
 from doorstate._locks import owned_folder
 from doorstate.errors import ConfigError, DatasetError, first_validation_error
+from doorstate.io.find import INDEX_FILE
 from doorstate.io.pcd import write_pcd
 from doorstate.simulation.frames import Frame
-from doorstate.simulation.manifest import MANIFEST_FILE, flatten
+from doorstate.simulation.manifest import MANIFEST_FILE, flatten, unflatten
 from doorstate.simulation.row import Row
 from doorstate.simulation.settings import RawKind, SimulationSettings
 from doorstate.simulation.shading import shade
@@ -77,6 +78,8 @@ def simulate_dataset(
             return read_csv(manifest)
         run_pieces(_simulate_piece, pieces, paths, workers or default_workers(), progress)
         rows = [row for path in paths for row in read_csv(path)]
+        if "depth" in settings.raw:
+            write_csv(folder / "depth" / INDEX_FILE, [_index_row(unflatten(row)) for row in rows])
         write_csv(manifest, rows)
         shutil.rmtree(scratch)
         return rows
@@ -172,6 +175,22 @@ def _simulate_piece(piece: _Piece, path: Path) -> None:
     if piece.callback:
         piece.callback(path.stem, rows, frames)
     write_csv(path, [flatten(row) for row in rows])
+
+
+def _index_row(row: Row) -> dict[str, str]:
+    """Return the line of a depth image in the index, from which its cloud can be read as it was rendered."""
+    camera = row.camera.intrinsics()
+    values = {
+        "file": f"{row.state}/{row.sample_id}.png",
+        "state": row.state,
+        "width": camera.width,
+        "height": camera.height,
+        **{name: getattr(camera, name) for name in ("fx", "fy", "cx", "cy")},
+        "depth_unit_m": 0.001,
+        "roll_deg": row.roll_deg,
+        "pitch_deg": row.pitch_deg,
+    }
+    return {name: str(value) for name, value in values.items()}
 
 
 def _write_raw(folder: Path, row: Row, frame: Frame, kinds: Iterable[RawKind]) -> None:

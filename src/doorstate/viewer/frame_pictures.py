@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from doorstate._paths import resolve_inside
 from doorstate.dataset.labelled import LabelledFrame
 from doorstate.pages.encoding import picture_uri
 from doorstate.types import Points
@@ -22,7 +23,7 @@ def frame_pictures(frame: LabelledFrame, cloud: Points) -> dict[str, str]:
     """Return data URIs by name: `colour` if the index names an image, `depth` of an organized cloud."""
     pictures = {}
     colour = frame.columns.get("rgb", "")
-    if colour and (frame.folder / colour).is_file():
+    if colour and resolve_inside(frame.folder, colour).is_file():
         # The page does not depend on the picture, which may be damaged.
         with suppress(OSError), Image.open(frame.folder / colour) as image:
             pictures["colour"] = picture_uri(np.asarray(image.convert("RGB")))

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from doorstate._files import read_csv
+from doorstate.dataset.frame_index import IndexedOptions
 from doorstate.dataset.store import PreparedDataset, is_prepared, open_dataset
 from doorstate.errors import DatasetError, DoorstateError
 from doorstate.io.find import find_clouds
@@ -42,7 +43,7 @@ def find_named_clouds(
 
     Args:
         paths: files, folders of files, prepared data sets and simulated folders.
-        options: how files are read.
+        options: how files are read that no `index.csv` describes.
 
     Raises:
         CloudReadError: a path does not exist, or a folder holds no cloud.
@@ -61,14 +62,15 @@ def find_named_clouds(
         else:
             files += find_clouds([path])
     parent = os.path.commonpath([file.absolute().parent for file in files]) if files else ""
-    return readers + [partial(read_named_cloud, file, Path(parent), options) for file in files]
+    indexed = IndexedOptions(options)
+    return readers + [partial(read_named_cloud, file, Path(parent), indexed) for file in files]
 
 
-def read_named_cloud(path: Path, folder: Path, options: ReadOptions) -> NamedCloud:
+def read_named_cloud(path: Path, folder: Path, options: IndexedOptions) -> NamedCloud:
     """Read a file; its name is the path relative to an absolute folder."""
     name = path.absolute().relative_to(folder).as_posix()
     try:
-        cloud, pose = read_posed_cloud(path, options)
+        cloud, pose = read_posed_cloud(path, options.of(path))
         return NamedCloud(name, cloud, pose=pose)
     except DoorstateError as error:
         return NamedCloud(name, error)

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from doorstate.dataset.frame_index import IndexedOptions
 from doorstate.errors import CloudReadError
 from doorstate.io.find import find_clouds
 from doorstate.io.options import DEFAULT_OPTIONS, ReadOptions
@@ -34,12 +35,13 @@ def watch_folder(
     """
     previous: dict[Path, tuple[int, int]] = {}
     done: dict[Path, tuple[int, int]] = {}
+    indexed = IndexedOptions(options)
     while True:
         current = _file_versions(folder)
         ready = [path for path, version in current.items() if previous.get(path) == version != done.get(path)]
         for path in ready:
             done[path] = current[path]
-            yield read_named_cloud(path, folder.absolute(), options)
+            yield read_named_cloud(path, folder.absolute(), indexed)
         previous = current
         time.sleep(0 if ready else poll_period_s)
 

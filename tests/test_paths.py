@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Names in tables that lead out of their folder."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from doorstate._paths import resolve_inside
+from doorstate.errors import DatasetError
+
+
+@pytest.mark.parametrize(
+    "name", ["a.png", "sub/a.png", "./a.png", "sub/../a.png", "", "..a/b", "not there.png"]
+)
+def test_names_inside(name: str, tmp_path: Path) -> None:
+    assert resolve_inside(tmp_path, name) == tmp_path / name
+
+
+@pytest.mark.parametrize(
+    "name", ["../a.png", "sub/../../a.png", "/etc/passwd", "link/a.png", "loop", "nul\0l"]
+)
+def test_names_outside_are_refused(name: str, tmp_path: Path) -> None:
+    folder = tmp_path / "folder"
+    (folder / "sub").mkdir(parents=True)
+    (folder / "link").symlink_to(tmp_path)
+    (folder / "loop").symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(DatasetError) as caught:
+        resolve_inside(folder, name)
+    assert caught.value.path == folder
+    assert str(caught.value).isprintable()
+
+
+def test_links_to_files_inside_are_followed(tmp_path: Path) -> None:
+    (tmp_path / "a.png").touch()
+    (tmp_path / "b.png").symlink_to("a.png")
+    assert resolve_inside(tmp_path, "b.png").is_file()
