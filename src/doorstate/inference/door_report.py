@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from doorstate.inference.prediction import Prediction
 from doorstate.inference.serialization import prediction_to_dict
 from doorstate.inference.state_filter import FilteredState
+from doorstate.io.sensor_pose import SensorPose
 from doorstate.rules.base import Detection
 
 UNKNOWN = "unknown"
@@ -28,6 +29,7 @@ class DoorReport:
     is_open: bool  # open now, and for long enough
     centre_m: NDArray[np.float64]  # (3,) median of the measured points, in the frame of the message
     detections: tuple[Detection, ...] = ()  # of a rule, in the frame of the message
+    pose: SensorPose | None = None  # of the camera; None without a readable message
 
     @property
     def state(self) -> str:
@@ -43,6 +45,7 @@ class DoorReport:
         values |= record.pop("probabilities", {}) | record
         values |= {f"filtered_{name}": round(p, 6) for name, p in self.filtered.probabilities.items()}
         values["held_s"] = 0.0 if self.held_s is None else round(self.held_s, 3)
+        values |= {} if self.pose is None else self.pose.to_dict()
         return {name: str(value) for name, value in values.items()}
 
     @property

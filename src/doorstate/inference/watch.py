@@ -113,6 +113,7 @@ class DoorWatch:
                 Detection(detection.name, pose.from_body(detection.points_m))
                 for detection in prediction.detections
             ),
+            pose,
         )
 
     def report_silence(self, now_ns: int) -> DoorReport:

@@ -45,7 +45,7 @@ class SensorPose:
         rotation: R_body_stored, (3, 3), row by row.
         axes: directions of x, y, z in the frame of the camera (`rotations`).
         roll_deg, pitch_deg: tilt of the camera, clockwise from behind and down.
-        position: of the camera in the frame of the points, in their unit; zero for points in the frame of the camera.
+        position_m: of the camera in the frame of the points, in metres; zero for points in the frame of the camera.
         axes_from, tilt_from: where axes and tilt come from.
     """
 
@@ -53,22 +53,22 @@ class SensorPose:
     axes: str = "flu"
     roll_deg: float = 0.0
     pitch_deg: float = 0.0
-    position: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    position_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     axes_from: Origin = "assumed"
     tilt_from: Origin = "assumed"
 
     def to_body(self, points: NDArray[Any]) -> Points:
-        """Return stored points (..., 3) in the body frame."""
-        if any(self.position):
+        """Return stored points (..., 3), in metres, in the body frame."""
+        if any(self.position_m):
             with np.errstate(over="ignore", invalid="ignore"):
-                points = points - np.array(self.position)
+                points = points - np.array(self.position_m)
         with np.errstate(over="ignore", invalid="ignore"):  # overflow gives infinity, which is "not measured"
             return rotate(points, np.array(self.rotation)).astype(np.float32, copy=False)
 
     def from_body(self, points: NDArray[Any]) -> NDArray[np.float64]:
-        """Return points (..., 3) of the body frame in the frame and unit of the stored points."""
+        """Return points (..., 3) of the body frame in the frame of the stored points, in metres."""
         stored: NDArray[np.float64] = rotate(points.astype(np.float64), np.array(self.rotation).T)
-        stored = stored + np.array(self.position)
+        stored = stored + np.array(self.position_m)
         return stored
 
     def to_dict(self) -> dict[str, Any]:
@@ -80,7 +80,9 @@ class SensorPose:
             "pitch_deg": round(self.pitch_deg, 3) + 0.0,
             "tilt_from": self.tilt_from,
         }
-        return values | ({"position_m": [round(x, 4) for x in self.position]} if any(self.position) else {})
+        return values | (
+            {"position_m": [round(x, 4) for x in self.position_m]} if any(self.position_m) else {}
+        )
 
 
 class PosedCloud(NamedTuple):
@@ -136,7 +138,7 @@ def pose_in_map(pose: SensorPose, viewpoint: Viewpoint) -> SensorPose:
         if pose.tilt_from != "assumed":
             map_from_sensor = np.array(quaternion_matrix(viewpoint.quaternion))
             rotation = _product(pose.rotation, map_from_sensor.T)
-            return replace(pose, rotation=rotation, position=viewpoint.position)
+            return replace(pose, rotation=rotation, position_m=viewpoint.position)
         heading_deg, pitch_deg, roll_deg = _heading_and_tilt_deg(
             pose.axes, pose.axes_from, viewpoint.quaternion
         )
@@ -151,7 +153,7 @@ def pose_in_map(pose: SensorPose, viewpoint: Viewpoint) -> SensorPose:
         rotation=heading_matrix(-heading_deg),
         roll_deg=roll_deg,
         pitch_deg=pitch_deg,
-        position=viewpoint.position,
+        position_m=viewpoint.position,
         tilt_from="VIEWPOINT",
     )
 

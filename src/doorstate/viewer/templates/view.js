@@ -106,6 +106,9 @@
   const metres = (value) => (value === undefined ? "" : `${value.toFixed(2)} m`);
   const degrees = (value) => (value === undefined ? "" : `${value.toFixed(0)}°`);
 
+  const axes = (pose) => pose && `${pose.axes} (${pose.axes_from})`;
+  const tilt = (pose) => pose && `${degrees(pose.pitch_deg)} down, ${degrees(pose.roll_deg)} clockwise (${pose.tilt_from})`;
+
   const facts = (prediction) => [
     ["opened", degrees(prediction.opening_angle_deg)],
     ["free width", metres(prediction.passable_width_m)],
@@ -113,6 +116,8 @@
     ["hinge", prediction.hinge],
     ["points used", prediction.points.toLocaleString("en")],
     ["time", `${prediction.milliseconds.toFixed(0)} ms`],
+    ["axes", axes(prediction.sensor_pose)],
+    ["camera tilt", tilt(prediction.sensor_pose)],
   ];
 
   function describe(entry) {
