@@ -184,7 +184,6 @@ def test_axes_are_those_that_the_header_names(predict: Run, weights: Path, tmp_p
         ((), 2, "--bag"),
         (("cloud.npy", "--bag", "BAG"), 2, "--bag"),
         (("cloud.npy", "--topic", "/points"), 2, "--topic"),
-        (("cloud.npy", "--every", 2), 2, "--every"),
         (("--bag", "BAG", "--out", "a.jsonl", "--json"), 2, "--json"),
         (("--bag", "gone.bag", "--out", "a.txt"), 2, "--out a.txt"),
         (("--bag", "gone.bag"), 1, "gone.bag"),

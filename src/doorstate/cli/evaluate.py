@@ -8,7 +8,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from doorstate.cli.options import AsJson, LayoutName, NetworkNames, PointCount, RuleNames, WeightsFiles
+from doorstate.cli.options import (
+    AsJson,
+    BudgetMs,
+    LayoutName,
+    NetworkNames,
+    PointCount,
+    RuleNames,
+    Threads,
+    WeightsFiles,
+)
 from doorstate.cli.reading_options import check_layout, with_reading_options
 from doorstate.errors import CloudReadError, ConfigError
 
@@ -30,6 +39,8 @@ def evaluate(
     weights: WeightsFiles = None,
     rule: RuleNames = None,
     points: PointCount = None,
+    budget_ms: BudgetMs = None,
+    threads: Threads = None,
     group: Annotated[
         str | None,
         typer.Option(
@@ -87,7 +98,9 @@ def evaluate(
         check_column(frames, column.partition(":")[0])
     if out is not None:
         check_writable(out / PAGE)
-    predictors = load_predictors(Methods(network, weights, rule), points)
+    predictors = load_predictors(
+        Methods(network, weights, rule), points, budget_ms=budget_ms, threads=threads
+    )
     with progress_bar("Predicting") as progress:
         results = evaluate_frames(predictors, frames, progress)
     for unreadable, reason in results.unreadable:

@@ -8,16 +8,14 @@ from typing import Annotated
 
 import typer
 
-from doorstate.cli.options import NetworkNames, WeightsFiles
+from doorstate.cli.options import NetworkNames, PointCount, WeightsFiles
 from doorstate.errors import ConfigError
 
 
 def export(
     network: NetworkNames = None,
     weights: WeightsFiles = None,
-    points: Annotated[
-        int | None, typer.Option(help="Points that the file takes. [default: as trained]", min=128)
-    ] = None,
+    points: PointCount = None,
     out: Annotated[Path | None, typer.Option(help="File to write. [default: NAME.onnx]")] = None,
     opset: Annotated[int, typer.Option(help="Version of the ONNX operator set.", min=18)] = 18,
     int8: Annotated[

@@ -52,9 +52,12 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, one object a l
 Threads = Annotated[
     int | None,
     typer.Option(
-        help="Processor threads of one call to a network. [default: one a processor, at most 4]", min=1
+        help="Processor threads of one call to a network. [default: one a processor, at most 4; serve shares processors]",
+        min=1,
     ),
 ]
+
+Every = Annotated[int, typer.Option("--every", help="Use only every Nth file or message.", min=1)]
 
 # Recordings.
 Bag = Annotated[

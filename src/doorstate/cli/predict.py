@@ -15,6 +15,7 @@ from doorstate.cli.options import (
     Bag,
     BudgetMs,
     CameraInfoTopic,
+    Every,
     NetworkNames,
     PointCount,
     RuleNames,
@@ -49,7 +50,7 @@ def predict(
     bag: Bag = None,
     topic: Topic = None,
     camera_info_topic: CameraInfoTopic = None,
-    every: Annotated[int, typer.Option(help="Use only every Nth message of the bag.", min=1)] = 1,
+    every: Every = 1,
     out: Annotated[
         Path | None, typer.Option(help="Write the predictions to this .csv or .jsonl file.")
     ] = None,
@@ -78,8 +79,8 @@ def predict(
     from doorstate.dataset.frame_index import IndexedOptions
 
     check_source(files, bag)
-    if bag is None and (topic, camera_info_topic, every) != (None, None, 1):
-        raise ConfigError("--topic, --camera-info-topic and --every need --bag")
+    if bag is None and (topic, camera_info_topic) != (None, None):
+        raise ConfigError("--topic and --camera-info-topic need --bag")
     if out is not None and as_json:
         raise ConfigError("--json cannot be combined with --out; a .jsonl file holds JSON lines")
     if out is not None and out.suffix not in WRITERS:
@@ -98,7 +99,7 @@ def predict(
             output,
         )
         return
-    sources = _find(files or [])
+    sources = _find(files or [])[::every]
     predictors = load_predictors(methods, points, budget_ms=budget_ms, threads=threads)
     indexed = IndexedOptions(options)
     clouds = (_predict_file(predictors, source, indexed) for source in sources)

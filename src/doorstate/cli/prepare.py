@@ -37,7 +37,8 @@ def prepare(
     poses: Annotated[
         Path | None,
         typer.Option(
-            help="CSV file with the poses of clouds in state folders: file,x_m,y_m or file,distance_m,robot_angle_deg."
+            "--pose-file",
+            help="CSV file with the poses of clouds in state folders: file,x_m,y_m or file,distance_m,robot_angle_deg.",
         ),
     ] = None,
     workers: Workers = None,
@@ -60,7 +61,7 @@ def prepare(
       doorstate prepare data/varied --thin --max-depth-m 5 --out data/varied-4096
       doorstate prepare data/varied --shard 2/8 --out data/varied-4096
       doorstate prepare DeepDoors2 --layout deepdoors2 --out data/deepdoors2
-      doorstate prepare ~/OGUROB_DOORS --poses poses.csv --axes optical --out data/original
+      doorstate prepare ~/OGUROB_DOORS --pose-file poses.csv --axes optical --out data/original
     """
     from doorstate._jobs import Shard
     from doorstate.cli.console import stdout
@@ -71,7 +72,7 @@ def prepare(
 
     check_layout(layout, options)
     if layout is not None and poses is not None:
-        raise ConfigError("--poses cannot be combined with --layout")
+        raise ConfigError("--pose-file cannot be combined with --layout")
     spec = CloudSpec(num_points=points, thin=thin, max_depth_m=max_depth, remove_outliers=not keep_outliers)
     preparation = Preparation(source, spec, poses, options, layout)
     if shard is not None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from doorstate.cli.options import BudgetMs, NetworkNames, PointCount, RuleNames, WeightsFiles
+from doorstate.cli.options import BudgetMs, NetworkNames, PointCount, RuleNames, Threads, WeightsFiles
 from doorstate.errors import missing_extra
 
 if TYPE_CHECKING:
@@ -61,13 +61,7 @@ def serve(
             help="Bearer token that requests must have; the environment variable keeps it out of process lists.",
         ),
     ] = None,
-    threads: Annotated[
-        int | None,
-        typer.Option(
-            help="Processor threads of one call to a network. [default: all processors, shared by the workers]",
-            min=1,
-        ),
-    ] = None,
+    threads: Threads = None,
     verbose: Annotated[bool, typer.Option("--verbose", help="Log requests on standard error.")] = False,
 ) -> None:
     """Serve predictions over HTTP.

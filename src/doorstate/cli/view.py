@@ -13,10 +13,13 @@ import typer
 
 from doorstate.cli.options import (
     Bag,
+    BudgetMs,
     CameraInfoTopic,
+    Every,
     NetworkNames,
     PointCount,
     RuleNames,
+    Threads,
     Topic,
     WeightsFiles,
     check_source,
@@ -46,6 +49,8 @@ def view(
     weights: WeightsFiles = None,
     rule: RuleNames = None,
     points: PointCount = None,
+    budget_ms: BudgetMs = None,
+    threads: Threads = None,
     out: Annotated[
         Path | None, typer.Option(help="Write the page to this .html file, without opening a browser.")
     ] = None,
@@ -53,7 +58,7 @@ def view(
         bool,
         typer.Option("--open/--no-open", help="Open the page in the browser, or only print its address."),
     ] = True,
-    every: Annotated[int, typer.Option(help="Show only every Nth cloud.", min=1)] = 1,
+    every: Every = 1,
     live: Annotated[
         bool, typer.Option("--live", help="Show a bag or a folder as clouds arrive, until Ctrl-C.")
     ] = False,
@@ -109,7 +114,9 @@ def view(
     else:
         source = nullcontext(_find_files(files or [], options, every))
     with source as (clouds, total):
-        predictor = load_predictor(Methods(network, weights, rule), points)
+        predictor = load_predictor(
+            Methods(network, weights, rule), points, budget_ms=budget_ms, threads=threads
+        )
         if live:
             show_live(predictor, clouds, port, open_browser)
         else:
