@@ -52,7 +52,7 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, one object a l
 Threads = Annotated[
     int | None,
     typer.Option(
-        help="Processor threads of one call to a network. [default: one a processor, at most 4; serve shares processors]",
+        help="Processor threads of one call to a network. [default: one a processor, at most 4; in serve, shared]",
         min=1,
     ),
 ]
