@@ -16,8 +16,10 @@ import pytest
 
 pytest.importorskip("rosbags")
 
+from doorstate.inference.predictor import Predictor
 from doorstate.io.pcd import write_pcd
 from doorstate.io.readers import read_cloud
+from doorstate.simulation.frames import Frame
 from doorstate.simulation.generate import simulate_rows
 from doorstate.simulation.presets import PRESETS
 from doorstate.simulation.settings import SimulationSettings
@@ -141,3 +143,26 @@ def test_onnx_robot_needs_no_torch(doors: Path, weights: Path, tmp_path: Path) -
         re.fullmatch(r"p\d+-open\.pcd: (closed|semi_open|open)( \(late\))?", line) for line in predictions
     )
     assert last.endswith("torch loaded: False")
+
+
+def test_onnxruntime_only_refuses_what_a_predictor_refuses(frames: list[Frame], tmp_path: Path) -> None:
+    exported = tmp_path / "door.onnx"
+    command = [Path(sys.executable).with_name("doorstate"), "export", "--points", "512", "--out", exported]
+    subprocess.run([*command, "--clouds", "3"], check=True, capture_output=True)
+    predictor = Predictor.load(exported)
+    seen = [frame.points[::4, ::4] for frame in frames]
+    half = seen[0].copy()
+    half[:, 70:] = np.nan
+    codes = []
+    for cloud in (*seen, half, seen[0][::20, ::20], seen[1] * np.float32(0.1), -seen[2]):
+        np.save(tmp_path / "cloud.npy", cloud)
+        prediction = predictor(cloud)
+        code = 0 if prediction.state else 2
+        answer = json.loads(example("onnxruntime_only", exported, tmp_path / "cloud.npy", code=code))
+        assert answer["state"] == prediction.state
+        if prediction.abstention is None:
+            assert answer["probability"] == pytest.approx(prediction.probability, abs=0.01)
+        else:
+            assert answer == {"state": None, "reason": prediction.abstention.code}
+            codes.append(prediction.abstention.code)
+    assert codes == ["no_door", "narrow_view", "too_few_points", "too_near", "points_behind_camera"]
