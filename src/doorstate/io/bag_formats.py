@@ -3,27 +3,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import partial
+from threading import Lock
 from typing import Any
 
 ROS1, CDR = "ros1", "cdr"  # encodings of messages in MCAP files
+_PATCHING = Lock()
 
 
-def accept_any_profile() -> None:
-    """Make rosbags open MCAP files of ROS 1, or of no profile, and ignore definitions and quality of service.
+@contextmanager
+def any_profile() -> Iterator[None]:
+    """Make rosbags open MCAP files of ROS 1, or of no profile, without definitions and quality of service.
 
-    Changes rosbags in the whole process. Messages are read by the definitions of doorstate, and quality of service is
-    YAML, whose aliases can expand to gigabytes.
+    Messages are read by the definitions of doorstate, and quality of service is YAML, whose aliases can expand to
+    gigabytes. rosbags is as before when the block ends; other threads wait until then.
     """
     from rosbags.interfaces import MessageDefinition, MessageDefinitionFormat
     from rosbags.rosbag2 import reader, storage_mcap, storage_sqlite3
 
-    storage_mcap.read_string = partial(_read_string, storage_mcap.read_bytes)
-    storage_mcap.get_msgdef = lambda schema: MessageDefinition(MessageDefinitionFormat.NONE, "")
-    modules: tuple[Any, ...] = (reader, storage_mcap, storage_sqlite3)
-    for module in modules:
-        module.parse_qos = lambda _: []
+    changes: list[tuple[Any, str, Callable[..., Any]]] = [
+        (storage_mcap, "read_string", partial(_read_string, storage_mcap.read_bytes)),
+        (storage_mcap, "get_msgdef", lambda _: MessageDefinition(MessageDefinitionFormat.NONE, "")),
+        *((module, "parse_qos", lambda _: []) for module in (reader, storage_mcap, storage_sqlite3)),
+    ]
+    with _PATCHING:
+        originals = [(module, name, getattr(module, name)) for module, name, _ in changes]
+        try:
+            for module, name, changed in changes:
+                setattr(module, name, changed)
+            yield
+        finally:
+            for module, name, original in originals:
+                setattr(module, name, original)
 
 
 def encoding_of(connection: Any, is_ros1_bag: bool) -> str:

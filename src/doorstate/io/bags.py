@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from doorstate.errors import CameraError, CloudReadError, DoorstateError, missing_extra, summarize_exception
-from doorstate.io.bag_formats import CDR, ROS1, accept_any_profile, encoding_of, ros2_name
+from doorstate.io.bag_formats import CDR, ROS1, any_profile, encoding_of, ros2_name
 from doorstate.io.bag_limits import (
     check_files,
     keep_packed,
@@ -90,11 +90,11 @@ def open_bag(path: Path) -> Iterator[Bag]:
         CDR: get_typestore(Stores.LATEST).deserialize_cdr,
     }
     limit_unpacking()
-    accept_any_profile()
     with ExitStack() as stack:
         with _wrap_errors(path, "damaged, or no bag"), limited_sqlite():
             reader = Reader1(path) if is_ros1 else Reader2(path)
-            reader.open()
+            with any_profile():
+                reader.open()
             stack.callback(reader.close)
             if not is_ros1:
                 keep_packed(reader)
