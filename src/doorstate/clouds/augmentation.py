@@ -8,14 +8,24 @@ Scale is the same along x and y: stretching one against the other would change t
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from doorstate._models import FrozenModel
 from doorstate.types import Points
+
+
+def _check_order(values: tuple[float, float]) -> tuple[float, float]:
+    if values[0] > values[1]:
+        raise ValueError("the first of the two is the smaller one")
+    return values
+
+
+_Scale = Annotated[float, Field(ge=0.01, le=100)]
+_Range = Annotated[tuple[_Scale, _Scale], AfterValidator(_check_order)]
 
 
 class Augmentation(FrozenModel):
@@ -23,12 +33,12 @@ class Augmentation(FrozenModel):
 
     yaw_deg: float = Field(default=0.0, ge=0, le=180)  # rotated about z by U(-yaw, yaw)
     mirror: float = Field(default=0.0, ge=0, le=1)  # probability of y -> -y
-    scale: tuple[float, float] = (1.0, 1.0)  # x, y and z alike, unless scale_z is set
-    scale_z: tuple[float, float] | None = None
-    shift: float = Field(default=0.0, ge=0)  # per axis U(-shift, shift)
-    tilt_deg: float = Field(default=0.0, ge=0)  # about x and y N(0, tilt), cut at 3 sigma
-    jitter: float = Field(default=0.0, ge=0)  # per coordinate N(0, jitter)
-    jitter_clip: float = Field(default=0.05, ge=0)
+    scale: _Range = (1.0, 1.0)  # x, y and z alike, unless scale_z is set
+    scale_z: _Range | None = None
+    shift: float = Field(default=0.0, ge=0, le=100)  # per axis U(-shift, shift)
+    tilt_deg: float = Field(default=0.0, ge=0, le=60)  # about x and y N(0, tilt), cut at 3 sigma
+    jitter: float = Field(default=0.0, ge=0, le=100)  # per coordinate N(0, jitter)
+    jitter_clip: float = Field(default=0.05, ge=0, le=100)
 
     @property
     def is_similarity(self) -> bool:

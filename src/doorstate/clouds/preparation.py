@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from doorstate._models import FrozenModel
 from doorstate.clouds.measured import is_measured
@@ -20,6 +21,7 @@ from doorstate.errors import TooFewPointsError
 from doorstate.types import MAX_COORDINATE, Indices, Points
 
 NUM_POINTS = 4096  # as in the paper
+MAX_NUM_POINTS = 1 << 20  # of a prepared cloud: farthest-point order beyond it takes minutes
 MIN_POINTS = 128  # fewer cannot fill the largest neighbourhood of a network
 
 
@@ -37,9 +39,9 @@ class CloudSpec(FrozenModel):
             Farthest-point sampling would pick them first.
     """
 
-    num_points: int = NUM_POINTS
+    num_points: int = Field(default=NUM_POINTS, ge=1, le=MAX_NUM_POINTS)
     thin: bool = False
-    max_depth_m: float | None = None
+    max_depth_m: float | None = Field(default=None, gt=0)
     remove_outliers: bool = True
 
 

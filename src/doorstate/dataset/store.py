@@ -12,13 +12,13 @@ from typing import Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ValidationError
+from pydantic import Field, ValidationError
 
 from doorstate._documents import read_json
 from doorstate._files import read_csv, write_text
 from doorstate._input import MAX_SETTINGS_BYTES
 from doorstate._models import FrozenModel
-from doorstate.clouds.preparation import CloudSpec
+from doorstate.clouds.preparation import MAX_NUM_POINTS, CloudSpec
 from doorstate.dataset.sampling import sample_frame
 from doorstate.errors import ConfigError, DatasetError, first_validation_error
 from doorstate.simulation.frames import Frame, replay
@@ -27,6 +27,7 @@ from doorstate.simulation.shading import shade
 from doorstate.types import NO_DOOR, STATES, Indices, Points
 
 CLOUDS_FILE, PARTS_FILE, DESCRIPTION_FILE = "clouds.npy", "parts.npy", "dataset.json"
+MAX_SAMPLES = 100_000_000
 _LABELS = (*STATES, NO_DOOR)
 _CACHED_CLOUDS = 512
 _CACHED_IMAGES = 64  # a megabyte each
@@ -38,11 +39,11 @@ class DatasetDescription(FrozenModel):
 
     kind: Literal["simulated", "imported"]
     source: str
-    num_points: int
-    samples: int
+    num_points: int = Field(ge=1, le=MAX_NUM_POINTS)
+    samples: int = Field(ge=0, le=MAX_SAMPLES)
     doorstate_version: str
     clouds: Literal["stored", "replayed"] = "stored"  # replayed: rendered from the manifest
-    max_depth_m: float | None = None  # points farther ahead were left out
+    max_depth_m: float | None = Field(default=None, gt=0)  # points farther ahead were left out
     thin: bool = False  # sampled from some rows and columns of each image, as a predictor does
     remove_outliers: bool = False  # not in data sets of version 0.1
 

@@ -22,6 +22,7 @@ from doorstate.evaluation.manifest import read_manifest
 from doorstate.evaluation.published import save_results
 from doorstate.evaluation.results import ComparisonConfig, Results, RunRecord, order_predictions
 from doorstate.rules.base import Detection
+from doorstate.training.contents import check_contents, contents_of_comparison, contents_of_run
 from doorstate.training.run_folder import RunFolder, run_of
 
 __all__ = ["Results", "has_results", "join_results", "load_part", "load_results", "save_results"]
@@ -45,7 +46,8 @@ def load_results(folder: Path, dataset: Path | None = None, folds: int | None = 
 
     Raises:
         RunError: no run is finished, a file is missing or damaged, a method tested a sample twice, or a state or a
-            test set differs from the manifest of the data set or from the splits.
+            test set differs from the manifest of the data set or from the splits, or the data set or the splits have
+            changed since the runs began.
     """
     if _is_run(folder):
         return _load_run(folder, dataset)
@@ -89,6 +91,7 @@ def _find_dataset(folder: Path, dataset: str, is_published: bool) -> Path:
 def _load_runs(
     folder: Path, config: ComparisonConfig, dataset_folder: Path, splits: tuple[Mapping[str, Role], ...]
 ) -> Results:
+    _check_contents(folder, config, dataset_folder, splits)
     contents = comparison_folder.read_runs(folder, config.methods, config.folds)
     if not contents:
         raise RunError("no run has predictions yet", path=folder, hint="train at least one network first")
@@ -162,6 +165,17 @@ def _gather(
     )
     check_predictions(results, path_of)
     return results
+
+
+def _check_contents(
+    folder: Path, config: ComparisonConfig, dataset_folder: Path, splits: Sequence[Mapping[str, Role]]
+) -> None:
+    """Raise RunError if the comparison, or one of its runs, began with other data or splits than there are now."""
+    check_contents(folder, contents_of_comparison(dataset_folder, splits))
+    for fold in range(config.folds):
+        contents = contents_of_run(dataset_folder, splits[fold])
+        for method in config.methods:
+            check_contents(run_of(folder, method, fold).path, contents)
 
 
 def load_part(

@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
 
+from doorstate._models import Name
 from doorstate.dataset.roles import Role
 from doorstate.rules.base import Detection
 from doorstate.types import NO_DOOR, STATES
@@ -29,12 +30,12 @@ class ComparisonConfig(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="allow")
 
-    name: str
+    name: Name
     dataset: str
     protocol: str
-    networks: tuple[str, ...]
-    rules: tuple[str, ...] = ()
-    folds: int
+    networks: tuple[Name, ...]
+    rules: tuple[Name, ...] = ()
+    folds: int = Field(ge=0, le=100)
     num_points: int
     seed: int
     recipe: Mapping[str, Any] = {}

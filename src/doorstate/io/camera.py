@@ -13,6 +13,9 @@ from numpy.typing import NDArray
 
 from doorstate.errors import CameraError
 from doorstate.io.distortion import Distortion
+from doorstate.io.size_limits import MAX_POINTS
+
+MAX_SIDE_PX = 1 << 15  # of an image
 
 
 @dataclass(frozen=True)
@@ -38,9 +41,10 @@ class Intrinsics:
     distortion: Distortion | None = None
 
     def __post_init__(self) -> None:
-        if min(self.width, self.height) < 1:
+        if min(self.width, self.height) < 1 or self.width * self.height > MAX_POINTS:
             raise CameraError(
-                f"an image size of {self.width} x {self.height} is impossible", expected="at least 1 pixel"
+                f"an image size of {self.width:.6g} x {self.height:.6g} is impossible",
+                expected=f"1 to {MAX_POINTS} pixels in all",
             )
         for name in ("fx", "fy", "cx", "cy"):
             value = getattr(self, name)

@@ -9,9 +9,9 @@ from pydantic import Field, ValidationError
 
 from doorstate import __version__
 from doorstate._documents import parse_json
-from doorstate._models import FrozenModel
+from doorstate._models import FrozenModel, Name
 from doorstate.clouds.normalization import SCALE_M
-from doorstate.clouds.preparation import CloudSpec
+from doorstate.clouds.preparation import MAX_NUM_POINTS, CloudSpec
 from doorstate.errors import WeightsError, first_validation_error
 from doorstate.types import STATES
 
@@ -21,16 +21,18 @@ CARD_KEY = "doorstate"  # of the card, in the metadata of weights files and expo
 class WeightsCard(FrozenModel):
     """Network, preparation of clouds, calibration and origin of a weights file."""
 
-    network: str
+    network: Name
     network_options: dict[str, Any] = Field(default_factory=dict)
-    num_points: int  # per cloud in training
-    default_points: int | None = Field(default=None, gt=0)  # per cloud in use, if fewer are as good
+    num_points: int = Field(ge=1, le=MAX_NUM_POINTS)  # per cloud in training
+    # Per cloud in use, if fewer are as good.
+    default_points: int | None = Field(default=None, ge=1, le=MAX_NUM_POINTS)
     heads: tuple[str, ...] = ()  # besides the state, by name (networks.heads)
-    scale_m: float = SCALE_M
+    scale_m: float = Field(default=SCALE_M, gt=0)
     states: tuple[str, ...] = STATES
     max_depth_m: float | None = Field(default=None, gt=0)  # range of the camera of the training clouds
     remove_outliers: bool = True  # before sampling, whatever the training clouds were
-    temperature: float = Field(default=1.0, gt=0)  # logits are divided by it (training.calibration)
+    # Logits are divided by it (training.calibration).
+    temperature: float = Field(default=1.0, ge=1e-3, le=1e3)
     abstain_below: float = Field(default=0.0, ge=0, lt=1)  # abstain if no state is more probable
     trained_on: str = ""
     doorstate_version: str = __version__

@@ -9,9 +9,13 @@ from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field, model_validator
 
 from doorstate._models import FrozenModel
-from doorstate.io.camera import Intrinsics
+from doorstate.io.camera import MAX_SIDE_PX, Intrinsics
+from doorstate.io.size_limits import MAX_POINTS
+
+MAX_RANGE_M = 1000.0
 
 
 class DepthCamera(FrozenModel):
@@ -21,13 +25,21 @@ class DepthCamera(FrozenModel):
     the image's unless `cx_px` and `cy_px` are set.
     """
 
-    width: int = 640
-    height: int = 480
-    hfov_deg: float = 60.0
-    min_depth_m: float = 0.4
-    max_depth_m: float = 5.0
-    cx_px: float | None = None
-    cy_px: float | None = None
+    width: int = Field(default=640, ge=1, le=MAX_SIDE_PX)
+    height: int = Field(default=480, ge=1, le=MAX_SIDE_PX)
+    hfov_deg: float = Field(default=60.0, ge=1, lt=180)
+    min_depth_m: float = Field(default=0.4, ge=0, le=MAX_RANGE_M)
+    max_depth_m: float = Field(default=5.0, gt=0, le=MAX_RANGE_M)
+    cx_px: float | None = Field(default=None, ge=-MAX_SIDE_PX, le=2 * MAX_SIDE_PX)
+    cy_px: float | None = Field(default=None, ge=-MAX_SIDE_PX, le=2 * MAX_SIDE_PX)
+
+    @model_validator(mode="after")
+    def _check_size(self) -> Self:
+        if self.width * self.height > MAX_POINTS:
+            raise ValueError(
+                f"an image of {self.width} x {self.height} pixels: expected at most {MAX_POINTS} in all"
+            )
+        return self
 
     def intrinsics(self) -> Intrinsics:
         """Return the pinhole model of Gazebo: f = W / (2 tan(hfov / 2)), centre ((W - 1) / 2, (H - 1) / 2)."""

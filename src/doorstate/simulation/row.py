@@ -5,10 +5,10 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import ConfigDict, field_serializer, field_validator
+from pydantic import field_serializer, field_validator
 
 from doorstate._documents import parse_json
-from doorstate._models import FrozenModel
+from doorstate._models import Degrees, FrozenModel, Metres, Seed
 from doorstate.errors import DatasetError
 from doorstate.simulation.camera import CameraPose, DepthCamera
 from doorstate.simulation.scene.box import Box
@@ -25,8 +25,6 @@ class Row(FrozenModel):
     set show the same scene.
     """
 
-    model_config = ConfigDict(allow_inf_nan=False)
-
     sample_id: str
     pose_id: str
     scene_id: str = ""
@@ -36,26 +34,26 @@ class Row(FrozenModel):
     door_kind: str = ""
     hinge: str = ""
     swing: str = ""
-    opening_angle_deg: float | None = None
-    passive_angle_deg: float | None = None
+    opening_angle_deg: Degrees | None = None
+    passive_angle_deg: Degrees | None = None
     opening_share: float | None = None
-    opening_width_m: float | None = None
-    opening_height_m: float | None = None
-    passable_width_m: float | None = None
-    x_m: float
-    y_m: float
-    camera_height_m: float
-    heading_deg: float
-    heading_offset_deg: float  # from the bearing to the door's middle
-    pitch_deg: float
-    roll_deg: float
-    distance_m: float
-    robot_angle_deg: float
-    door_x_m: float | None = None
-    door_y_m: float | None = None
-    door_z_m: float | None = None
-    door_yaw_deg: float | None = None
-    seed: int
+    opening_width_m: Metres | None = None
+    opening_height_m: Metres | None = None
+    passable_width_m: Metres | None = None
+    x_m: Metres
+    y_m: Metres
+    camera_height_m: Metres
+    heading_deg: Degrees
+    heading_offset_deg: Degrees  # from the bearing to the door's middle
+    pitch_deg: Degrees
+    roll_deg: Degrees
+    distance_m: Metres
+    robot_angle_deg: Degrees
+    door_x_m: Metres | None = None
+    door_y_m: Metres | None = None
+    door_z_m: Metres | None = None
+    door_yaw_deg: Degrees | None = None
+    seed: Seed
     sensor: str = "none"  # a name for noise.sensors.find_sensor
     camera: DepthCamera
     scene: Scene

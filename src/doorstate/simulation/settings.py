@@ -5,16 +5,17 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import Field
+from pydantic import Field, ValidationError
 
-from doorstate._models import FrozenModel
-from doorstate.errors import ConfigError, unknown_name
+from doorstate._models import FrozenModel, Seed
+from doorstate.errors import ConfigError, first_validation_error, unknown_name
 from doorstate.simulation.frames import Frame
 from doorstate.simulation.generate import simulate_rows
 from doorstate.simulation.noise.sensors import find_sensor
 from doorstate.simulation.presets import PRESETS, Preset
 from doorstate.simulation.row import Row
 
+MAX_SCENES = 1_000_000
 RawKind = Literal["pcd", "depth", "image"]
 RAW_KINDS: tuple[RawKind, ...] = ("pcd", "depth", "image")
 
@@ -27,8 +28,8 @@ class SimulationSettings(FrozenModel):
     """
 
     preset: Preset
-    seed: int
-    poses: int | None = Field(default=None, ge=1)
+    seed: Seed
+    poses: int | None = Field(default=None, ge=1, le=MAX_SCENES)
     raw: tuple[RawKind, ...] = ()
     sensor: str = "none"
 
@@ -77,11 +78,14 @@ def settings_for(
     if not chosen.has_many_scenes and scenes is not None:
         raise ConfigError(f"preset {preset!r} has one scene", field="scenes", suggestions={"poses": scenes})
     count = scenes if chosen.has_many_scenes else poses
-    if count is not None and count < 1:
+    if count is not None and not 1 <= count <= MAX_SCENES:
         raise ConfigError(
-            f"{count} is too few",
+            f"{count} is out of range",
             field="scenes" if chosen.has_many_scenes else "poses",
-            expected="at least 1",
+            expected=f"1 to {MAX_SCENES}",
         )
     chosen.indices(count)
-    return SimulationSettings(preset=chosen, seed=seed, poses=count, raw=raw, sensor=sensor)
+    try:
+        return SimulationSettings(preset=chosen, seed=seed, poses=count, raw=raw, sensor=sensor)
+    except ValidationError as error:
+        raise ConfigError(first_validation_error(error)) from error

@@ -19,6 +19,7 @@ from doorstate.dataset.store import PreparedDataset, open_dataset
 from doorstate.errors import ConfigError, RunError, first_validation_error
 from doorstate.rules import create_rule
 from doorstate.training.config import RunConfig
+from doorstate.training.contents import contents_of_comparison, keep_contents
 from doorstate.training.experiment import Experiment
 from doorstate.training.leakage import check_extra_datasets, check_start_from
 from doorstate.training.rule_run import RuleRunConfig, run_rule
@@ -86,7 +87,8 @@ def prepare_comparison(experiment: Experiment, folder: Path) -> None:
     """Write the configuration and the splits, or check that the folder holds the same comparison.
 
     Raises:
-        RunError: the folder holds another comparison, or the weights to start from were trained on test samples.
+        RunError: the folder holds another comparison or began with other data, or the weights to start from were
+            trained on test samples.
         ConfigError: a data set does not fit the experiment.
         DatasetError: a data set cannot be opened.
     """
@@ -100,14 +102,17 @@ def prepare_comparison(experiment: Experiment, folder: Path) -> None:
     dataset = open_dataset(Path(experiment.dataset))
     check_extra_datasets(experiment, dataset)
     if not splits_path.is_file():
-        splits = draw_splits(dataset.rows, experiment.protocol, experiment.seed)
+        drawn = draw_splits(dataset.rows, experiment.protocol, experiment.seed)
         if experiment.networks:
-            used = [sample for sample, role in splits[0].items() if role != "unused"]
+            used = [sample for sample, role in drawn[0].items() if role != "unused"]
             check_states(dataset, used, experiment.heads)
-        write_splits(splits_path, splits)
+        write_splits(splits_path, drawn)
+    splits = read_splits(splits_path)
     if experiment.start_from is not None:
         start_from = Path(experiment.start_from)
-        check_start_from(experiment, read_splits(splits_path), start_from, read_comparison(start_from))
+        check_start_from(experiment, splits, start_from, read_comparison(start_from))
+    extra_folders = map(Path, experiment.extra_train_datasets)
+    keep_contents(folder, contents_of_comparison(dataset.folder, splits, extra_folders))
     write_json(path, settings)
 
 

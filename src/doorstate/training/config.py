@@ -8,20 +8,22 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from doorstate._models import FrozenModel
+from doorstate._models import FrozenModel, Name, Seed
+from doorstate.clouds.preparation import MAX_NUM_POINTS, MIN_POINTS
+from doorstate.dataset.splits import NUM_FOLDS
 from doorstate.training.recipes import Recipe
 
 
 class RunConfig(FrozenModel):
     """Configuration of a run, stored in its folder; a folder is continued only with the same configuration."""
 
-    network: str
+    network: Name
     network_options: dict[str, Any] = Field(default_factory=dict)
     dataset: str
     protocol: str
-    fold: int
-    num_points: int
-    seed: int
+    fold: int = Field(ge=0, lt=NUM_FOLDS)
+    num_points: int = Field(ge=MIN_POINTS, le=MAX_NUM_POINTS)
+    seed: Seed
     recipe: Recipe
     start_from: str | None = None  # weights file to start from
     heads: tuple[str, ...] = ()  # heads besides the state (networks.heads)

@@ -10,8 +10,8 @@ from typing import Any
 from pydantic import Field, ValidationError
 
 from doorstate._documents import read_toml
-from doorstate._models import FrozenModel
-from doorstate.clouds.preparation import MIN_POINTS, NUM_POINTS
+from doorstate._models import FrozenModel, Name, Seed
+from doorstate.clouds.preparation import MAX_NUM_POINTS, MIN_POINTS, NUM_POINTS
 from doorstate.dataset.splits import NUM_FOLDS, ONE_FOLD, PROTOCOLS, UNSEEN
 from doorstate.errors import ConfigError, first_validation_error
 from doorstate.networks import create_network, list_networks, network_class
@@ -25,14 +25,14 @@ from doorstate.types import PARTS
 class Experiment(FrozenModel):
     """Configuration of one comparison: one flat TOML file."""
 
-    name: str
+    name: Name
     dataset: str
     protocol: str = "paper"
-    networks: tuple[str, ...] = Field(default_factory=lambda: tuple(list_networks()))
-    rules: tuple[str, ...] = ()  # tested on the same samples; nothing is trained
+    networks: tuple[Name, ...] = Field(default_factory=lambda: tuple(list_networks()))
+    rules: tuple[Name, ...] = ()  # tested on the same samples; nothing is trained
     folds: int = Field(default=NUM_FOLDS, ge=1, le=NUM_FOLDS)  # number of folds to run
-    num_points: int = Field(default=NUM_POINTS, ge=MIN_POINTS)
-    seed: int = 0
+    num_points: int = Field(default=NUM_POINTS, ge=MIN_POINTS, le=MAX_NUM_POINTS)
+    seed: Seed = 0
     recipe: str = "common"
     recipe_changes: dict[str, Any] = Field(default_factory=dict)  # fields of the recipe
     # By network; these win over `recipe_changes`.

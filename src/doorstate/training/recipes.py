@@ -4,53 +4,63 @@
 from __future__ import annotations
 
 import math
-from typing import Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
-from pydantic import Field, NonNegativeFloat, field_validator
+from pydantic import Field, field_validator
 
-from doorstate._models import FrozenModel
+from doorstate._models import FrozenModel, Name
 from doorstate.clouds.augmentation import Augmentation
-from doorstate.clouds.preparation import MIN_POINTS
+from doorstate.clouds.preparation import MAX_NUM_POINTS, MIN_POINTS
 from doorstate.errors import ConfigError
 
 RECIPES = ("common", "authors")
+MAX_EPOCHS = 100_000
+_MAX_BATCH = 1 << 16
+_MAX_ITERATIONS = 10**9
+_MAX_RATE = 100.0
+_Share = Annotated[float, Field(gt=0, le=1)]
+_LossWeight = Annotated[float, Field(ge=0, le=1e6)]
 
 
 class CoarseStage(FrozenModel):
     """Share of the epochs that uses the first points of each cloud and the first centres of the network."""
 
     share: float = Field(gt=0, le=1)
-    points: int = Field(ge=MIN_POINTS)
+    points: int = Field(ge=MIN_POINTS, le=MAX_NUM_POINTS)
     centres: float = Field(default=1.0, gt=0, le=1)  # share of the network's centres
 
 
 class Recipe(FrozenModel):
     """Everything that decides how a network is trained, except the data and the network."""
 
-    name: str
-    epochs: int = Field(default=30, ge=0)  # 0: only test the weights that the run starts from
-    clouds_per_epoch: int | None = Field(default=None, ge=2)  # drawn for each epoch; None: all
-    batch_size: int = Field(default=16, ge=2)
+    name: Name
+    epochs: int = Field(default=30, ge=0, le=MAX_EPOCHS)  # 0: only test the weights that the run starts from
+    clouds_per_epoch: int | None = Field(
+        default=None, ge=2, le=_MAX_ITERATIONS
+    )  # drawn for each epoch; None: all
+    batch_size: int = Field(default=16, ge=2, le=_MAX_BATCH)
     optimizer: Literal["adamw", "adam", "sgd", "muon"] = "adamw"
-    learning_rate: float = Field(default=2e-3, gt=0)  # the highest of the schedule
-    min_learning_rate: float = Field(default=0.0, ge=0)
-    weight_decay: float = Field(default=0.05, ge=0)
-    adam_eps: float = 1e-8
-    momentum: float = 0.9  # SGD
+    learning_rate: float = Field(default=2e-3, ge=1e-12, le=_MAX_RATE)  # the highest of the schedule
+    min_learning_rate: float = Field(default=0.0, ge=0, le=_MAX_RATE)
+    weight_decay: float = Field(default=0.05, ge=0, le=_MAX_RATE)
+    adam_eps: float = Field(default=1e-8, gt=0, le=1)
+    momentum: float = Field(default=0.9, ge=0, lt=1)  # SGD
     schedule: Literal["one-cycle", "cosine", "steps"] = "one-cycle"
     warmup: float = Field(default=0.2, gt=0, lt=1)  # one-cycle: share of the training in which the rate rises
-    step_factor: float = 0.7  # steps: factor of the rate after each step
-    step_epochs: int = 20  # steps: epochs between steps
-    step_iterations: int | None = None  # steps: iterations between steps, in place of step_epochs
+    step_factor: float = Field(default=0.7, gt=0, le=1)  # steps: factor of the rate after each step
+    step_epochs: int = Field(default=20, ge=1, le=MAX_EPOCHS)  # steps: epochs between steps
+    step_iterations: int | None = Field(
+        default=None, ge=1, le=_MAX_ITERATIONS
+    )  # steps: in place of step_epochs
     label_smoothing: float = Field(default=0.1, ge=0, lt=1)  # as in torch.nn.CrossEntropyLoss
-    gradient_clip: float | None = 10.0  # largest norm of the gradient
-    batchnorm_eps: float | None = None  # None: torch's 1e-5
-    batchnorm_momentum: tuple[float, float] | None = None  # first and last; halved after each step
+    gradient_clip: float | None = Field(default=10.0, gt=0, le=1e6)  # largest norm of the gradient
+    batchnorm_eps: float | None = Field(default=None, gt=0, le=1)  # None: torch's 1e-5
+    batchnorm_momentum: tuple[_Share, _Share] | None = None  # first and last; halved after each step
     augmentation: Augmentation = Augmentation()
     coarse_to_fine: tuple[CoarseStage, ...] = ()  # the last epochs use all points and centres
     # Points of each cloud in the loss of the parts; None: all.
-    part_points: int | None = Field(default=None, ge=1)
-    loss_weights: dict[str, NonNegativeFloat] = Field(default_factory=dict)  # by head or "state"; default 1
+    part_points: int | None = Field(default=None, ge=1, le=MAX_NUM_POINTS)
+    loss_weights: dict[str, _LossWeight] = Field(default_factory=dict)  # by head or "state"; default 1
     precision: Literal["auto", "fp32", "bf16"] = "auto"
     compile: bool = False  # torch.compile; docs/speed.md has its effect
 

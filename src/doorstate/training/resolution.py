@@ -9,7 +9,9 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from doorstate.clouds.preparation import MIN_POINTS
+from doorstate._models import Seed
+from doorstate.clouds.preparation import MAX_NUM_POINTS, MIN_POINTS
+from doorstate.dataset.splits import NUM_FOLDS
 from doorstate.training.experiment import Experiment
 from doorstate.training.run_folder import AS_TRAINED, FINE_TUNED
 from doorstate.training.study import Study, StudyPart
@@ -21,9 +23,9 @@ class ResolutionStudy(Study):
     dataset: str
     start_from: str  # folder of a finished comparison
     protocol: str = "paper"
-    folds: int = Field(default=1, ge=1)
-    points: tuple[Annotated[int, Field(ge=MIN_POINTS)], ...] = Field(min_length=1)
-    seed: int = 0
+    folds: int = Field(default=1, ge=1, le=NUM_FOLDS)
+    points: tuple[Annotated[int, Field(ge=MIN_POINTS, le=MAX_NUM_POINTS)], ...] = Field(min_length=1)
+    seed: Seed = 0
     heads: tuple[str, ...] = ()  # those of the weights
     fine_tuning: dict[str, Any] | None = None  # fields of the common recipe; None: no fine-tuning
 

@@ -10,16 +10,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import Field
 from sklearn.metrics import accuracy_score, f1_score
 
 from doorstate._files import write_csv, write_text
 from doorstate._locks import owned_folder
-from doorstate._models import FrozenModel
+from doorstate._models import FrozenModel, Name
 from doorstate.dataset.roles import Role
+from doorstate.dataset.splits import NUM_FOLDS
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import DatasetError
 from doorstate.rules import create_rule
 from doorstate.rules.base import RuleResult
+from doorstate.training.contents import contents_of_run, keep_contents
 from doorstate.training.environment import describe_environment
 from doorstate.training.run_folder import RunFolder
 from doorstate.types import ABSTAINED, NO_DOOR, STATES
@@ -31,11 +34,11 @@ _OPEN_OR_NOT = ("not_open", "open")
 class RuleRunConfig(FrozenModel):
     """Configuration of a run, stored in its folder; a folder is continued only with the same configuration."""
 
-    rule: str
+    rule: Name
     parameters: dict[str, Any]
     dataset: str
     protocol: str
-    fold: int
+    fold: int = Field(ge=0, lt=NUM_FOLDS)
 
 
 def run_rule(
@@ -57,7 +60,7 @@ def run_rule(
 
     Raises:
         DatasetError: there is no test sample with a door.
-        RunError: the folder holds another run.
+        RunError: the folder holds another run, or began with other data.
         FolderInUseError: another process works in the folder.
     """
     with owned_folder(folder):
@@ -68,6 +71,7 @@ def _apply(
     config: RuleRunConfig, dataset: PreparedDataset, roles: Mapping[str, Role], run: RunFolder
 ) -> dict[str, Any]:
     run.claim(config.model_dump(mode="json"), describe_environment())
+    keep_contents(run.path, contents_of_run(dataset.folder, roles))
     if run.finished:
         return run.read_metrics()
     samples = _test_samples(dataset, roles)
@@ -100,6 +104,7 @@ def _apply(
         "median_ms": float(np.median(milliseconds)),
         "p95_ms": float(np.quantile(milliseconds, 0.95)),
     }
+    keep_contents(run.path, contents_of_run(dataset.folder, roles))
     run.finish(metrics)
     return metrics
 

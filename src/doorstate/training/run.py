@@ -25,6 +25,7 @@ from doorstate.networks.heads import head_columns
 from doorstate.networks.weights import load_into, save_weights
 from doorstate.training.checkpoint import TrainingState
 from doorstate.training.config import RunConfig
+from doorstate.training.contents import contents_of_run, keep_contents
 from doorstate.training.data import RunData
 from doorstate.training.environment import describe_environment, has_fast_bf16
 from doorstate.training.network_outputs import network_outputs
@@ -55,7 +56,7 @@ def train_run(
 
     Raises:
         ConfigError: there are no epochs and no weights to start from.
-        RunError: the folder holds another run, or the loss is not finite.
+        RunError: the folder holds another run or began with other data, or the loss is not finite.
         FolderInUseError: another process works in the folder.
         DatasetError: a role has too few samples.
         WeightsError: the weights to start from are missing or do not fit.
@@ -76,6 +77,12 @@ def _train(
     extra_datasets: Sequence[PreparedDataset],
 ) -> dict[str, Any]:
     run.claim(config.model_dump(mode="json"), describe_environment())
+    extra_folders = [extra.folder for extra in extra_datasets]
+
+    def check_unchanged() -> None:
+        keep_contents(run.path, contents_of_run(dataset.folder, roles, extra_folders, config.start_from))
+
+    check_unchanged()
     if run.finished:
         return run.read_metrics()
     data = RunData(dataset, roles, config.heads, extra_datasets)
@@ -90,6 +97,7 @@ def _train(
         else:
             state = Trainer(config, fabric, network, data, run).train()
         metrics = evaluate_run(config, fabric, network, data, run, state)
+    check_unchanged()
     run.finish(metrics)
     return metrics
 

@@ -11,7 +11,7 @@ from typing import NamedTuple, TypeVar
 from pydantic import Field, ValidationError
 
 from doorstate._documents import read_toml
-from doorstate._models import FrozenModel
+from doorstate._models import FrozenModel, Name
 from doorstate.errors import ConfigError, first_validation_error
 from doorstate.networks import list_networks
 from doorstate.training.experiment import Experiment
@@ -29,8 +29,8 @@ class StudyPart(NamedTuple):
 class Study(FrozenModel, ABC):
     """Configuration of a study: one flat TOML file."""
 
-    name: str
-    networks: tuple[str, ...] = Field(default_factory=lambda: tuple(list_networks()))
+    name: Name
+    networks: tuple[Name, ...] = Field(default_factory=lambda: tuple(list_networks()))
 
     @abstractmethod
     def parts(self) -> Iterator[StudyPart]:

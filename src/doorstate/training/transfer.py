@@ -9,7 +9,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from doorstate.clouds.preparation import MIN_POINTS, NUM_POINTS
+from doorstate.clouds.preparation import MAX_NUM_POINTS, MIN_POINTS, NUM_POINTS
 from doorstate.dataset.roles import Role
 from doorstate.dataset.splits import UNSEEN, origin, read_splits, write_splits
 from doorstate.dataset.store import open_dataset
@@ -18,7 +18,7 @@ from doorstate.training.comparison import read_comparison
 from doorstate.training.experiment import Experiment
 from doorstate.training.study import Study, StudyPart
 
-_Name = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9-]*$")]
+_Name = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9-]*$", max_length=50)]
 
 
 class TransferStudy(Study):
@@ -26,7 +26,7 @@ class TransferStudy(Study):
 
     trained: dict[_Name, str] = Field(min_length=1)  # folders of comparisons
     tested: dict[_Name, str] = Field(min_length=1)  # folders of prepared data sets
-    num_points: int = Field(default=NUM_POINTS, ge=MIN_POINTS)
+    num_points: int = Field(default=NUM_POINTS, ge=MIN_POINTS, le=MAX_NUM_POINTS)
 
     def parts(self) -> Iterator[StudyPart]:
         """Yield a comparison for every pair of weights and data set, with those of the networks that have weights.

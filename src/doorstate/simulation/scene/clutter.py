@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from typing import Literal
 
-from doorstate._models import FrozenModel
+from doorstate._models import Degrees, FrozenModel, Metres
 from doorstate.simulation.scene.box import Box, place
 from doorstate.types import Part
 
@@ -19,12 +19,12 @@ class Item(FrozenModel):
     """A piece of clutter: position of its middle in the door frame, and size."""
 
     kind: ItemKind
-    x_m: float
-    y_m: float
-    yaw_deg: float
-    width_m: float
-    depth_m: float
-    height_m: float
+    x_m: Metres
+    y_m: Metres
+    yaw_deg: Degrees
+    width_m: Metres
+    depth_m: Metres
+    height_m: Metres
 
 
 def item_boxes(item: Item) -> list[Box]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from doorstate._models import FrozenModel
+from doorstate._models import Degrees, FrozenModel, Metres
 from doorstate.simulation.scene.handle import Handle
 
 Hinge = Literal["left", "right"]
@@ -21,28 +21,28 @@ class Door(FrozenModel):
     the side it opens to, and `swing` the wall face it runs along.
     """
 
-    opening_width_m: float = 0.90
-    opening_height_m: float = 2.10
+    opening_width_m: Metres = 0.90
+    opening_height_m: Metres = 2.10
     hinge: Hinge = "left"
     swing: Swing = "towards"
-    leaf_thickness_m: float = 0.04
-    leaf_gap_m: float = 0.003  # to the jambs and the head
-    leaf_floor_gap_m: float = 0.006
-    wall_thickness_m: float = 0.15
-    wall_height_m: float = 2.6
-    wall_half_length_m: float = 6.0
-    jamb_thickness_m: float = 0.03
-    casing_width_m: float = 0.06
-    casing_thickness_m: float = 0.015
-    stop_width_m: float = 0.012  # by which the stop projects from the jamb
-    stop_depth_m: float = 0.03
-    floor_size_m: float = 16.0
+    leaf_thickness_m: Metres = 0.04
+    leaf_gap_m: Metres = 0.003  # to the jambs and the head
+    leaf_floor_gap_m: Metres = 0.006
+    wall_thickness_m: Metres = 0.15
+    wall_height_m: Metres = 2.6
+    wall_half_length_m: Metres = 6.0
+    jamb_thickness_m: Metres = 0.03
+    casing_width_m: Metres = 0.06
+    casing_thickness_m: Metres = 0.015
+    stop_width_m: Metres = 0.012  # by which the stop projects from the jamb
+    stop_depth_m: Metres = 0.03
+    floor_size_m: Metres = 16.0
     kind: DoorKind = "single"
-    leaf_recess_m: float = 0.0  # of the leaf's face behind the wall's; negative in front of it
-    hinge_offset_m: float = 0.0  # of the hinge pin in front of the leaf's face
+    leaf_recess_m: Metres = 0.0  # of the leaf's face behind the wall's; negative in front of it
+    hinge_offset_m: Metres = 0.0  # of the hinge pin in front of the leaf's face
     active_share: float = 1.0  # of the total leaf width
-    pane_bottom_m: float | None = None  # glazed leaves only
-    threshold_m: float = 0.0
+    pane_bottom_m: Metres | None = None  # glazed leaves only
+    threshold_m: Metres = 0.0
     handle: Handle | None = None
 
     @property
@@ -59,6 +59,6 @@ class Door(FrozenModel):
 class Opening(FrozenModel):
     """State of the leaves: angles of the active and the passive leaf, or the open share of a sliding door's width."""
 
-    angle_deg: float = 0.0
-    passive_angle_deg: float = 0.0
+    angle_deg: Degrees = 0.0
+    passive_angle_deg: Degrees = 0.0
     share: float = 0.0

@@ -5,7 +5,9 @@ from __future__ import annotations
 
 from typing import Literal, get_args
 
-from doorstate._models import FrozenModel
+from pydantic import Field
+
+from doorstate._models import FrozenModel, Metres
 from doorstate.simulation.scene.box import Box
 from doorstate.types import Part
 
@@ -22,15 +24,15 @@ class Feature(FrozenModel):
     """A wall without a door, and the object in or before it, whose middle is the origin of the door frame."""
 
     kind: FeatureKind
-    wall_thickness_m: float
-    wall_height_m: float
-    floor_size_m: float = 16.0
-    width_m: float = 0.0
-    bottom_m: float = 0.0
-    top_m: float = 0.0
-    depth_m: float = 0.0
-    fronts: int = 0  # of a cupboard
-    corner_m: float = 0.0  # x of the corner
+    wall_thickness_m: Metres
+    wall_height_m: Metres
+    floor_size_m: Metres = 16.0
+    width_m: Metres = 0.0
+    bottom_m: Metres = 0.0
+    top_m: Metres = 0.0
+    depth_m: Metres = 0.0
+    fronts: int = Field(default=0, ge=0, le=20)  # of a cupboard
+    corner_m: Metres = 0.0  # x of the corner
 
 
 def feature_boxes(feature: Feature) -> list[Box]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from doorstate._models import FrozenModel
+from doorstate._models import FrozenModel, Metres
 from doorstate.simulation.scene.box import Box
 from doorstate.types import Part
 
@@ -20,9 +20,9 @@ class Handle(FrozenModel):
     """A handle; `length_m` is the length of a lever's or bar's grip."""
 
     kind: HandleKind
-    height_m: float
-    projection_m: float
-    length_m: float
+    height_m: Metres
+    projection_m: Metres
+    length_m: Metres
 
 
 def handle_boxes(handle: Handle, leaf_width_m: float, face_y_m: float, side: int) -> list[Box]:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from doorstate._models import FrozenModel
+from doorstate._models import FrozenModel, Metres
 from doorstate.simulation.scene.box import Box
 from doorstate.types import Part
 
@@ -15,9 +15,9 @@ _LONG_M = 8.0  # length of walls without an end: beyond the camera's range
 class Space(FrozenModel):
     """Distances from the middle of the door or feature to the inner faces of the room's walls; None is open."""
 
-    left_m: float | None = None
-    right_m: float | None = None
-    depth_m: float | None = None
+    left_m: Metres | None = None
+    right_m: Metres | None = None
+    depth_m: Metres | None = None
 
 
 def space_boxes(space: Space, wall_y_m: float, side: int, height_m: float) -> list[Box]:

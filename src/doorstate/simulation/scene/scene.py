@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import Self
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from doorstate._models import FrozenModel
 from doorstate.simulation.scene.box import Box
@@ -28,12 +28,14 @@ class Scene(FrozenModel):
     near: Space = Space()  # on the robot's side of the wall
     far: Space = Space()
     has_ceiling: bool = True
-    items: tuple[Item, ...] = ()
+    items: tuple[Item, ...] = Field(default=(), max_length=200)
 
     @model_validator(mode="after")
     def _check_door_or_feature(self) -> Self:
         if (self.door is None) == (self.feature is None):
             raise ValueError("a scene has either a door or a feature")
+        if self.feature and self.feature.kind == "cupboard" and not self.feature.fronts:
+            raise ValueError("a cupboard has at least one front")
         return self
 
     @property
