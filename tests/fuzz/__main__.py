@@ -2,34 +2,78 @@
 """Fuzz one target guided by coverage, with atheris (libFuzzer): `python -m tests.fuzz pcd --runs 100000`.
 
 Inputs that reach new code are kept in a folder, from which the next run continues. A failing input is written as
-`crash-...`; give that file to run it again.
+`crash-...`; give that file to run it again. Targets of settings take their inputs as the content of the file;
+`--damage` drives their hypothesis tests instead, which damage the bytes of compressed files and of weights too.
+
+`python -m tests.fuzz all --runs 10000` fuzzes one target after another, each in its own process, and prints a table.
 """
 
 from __future__ import annotations
 
 import argparse
+import re
+import subprocess
 import sys
+import time
 import warnings
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import atheris
 
-with atheris.instrument_imports(
-    include=["doorstate.io", "doorstate.serving.body", "pypcd4", "PIL", "rosbags", "ruamel", "yaml"]
-):
-    from tests.fuzz.targets import TARGETS
+_INSTRUMENTED = [
+    "doorstate._documents",
+    "doorstate._files",
+    "doorstate.dataset",
+    "doorstate.evaluation",
+    "doorstate.io",
+    "doorstate.networks.card",
+    "doorstate.serving.body",
+    "doorstate.simulation",
+    "doorstate.training",
+    "pypcd4",
+    "PIL",
+    "rosbags",
+    "ruamel",
+    "tomllib",
+    "yaml",
+]
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m tests.fuzz", description=__doc__)
-    parser.add_argument("target", choices=TARGETS)
+    parser.add_argument("target", help="name of a target, or all")
     parser.add_argument("inputs", nargs="*", type=Path, help="run these inputs once instead of fuzzing")
     parser.add_argument("--runs", type=int, default=-1, help="number of inputs (default: until interrupted)")
     parser.add_argument("--seconds", type=int, default=0, help="time limit (default: none)")
     parser.add_argument("--corpus", type=Path, default=Path("build/fuzz"), help="folder of kept inputs")
+    parser.add_argument("--damage", action="store_true", help="damage valid files instead of their content")
     arguments = parser.parse_args()
-    corpus = arguments.corpus / arguments.target
+    if arguments.target == "all":
+        fuzz_all(arguments)
+        return
+    fuzz(arguments)
+
+
+def fuzz(arguments: argparse.Namespace) -> None:
+    """Fuzz one target in this process, which libFuzzer ends."""
+    with atheris.instrument_imports(include=_INSTRUMENTED):
+        from tests.fuzz import settings_files
+        from tests.fuzz.targets import TARGETS
+
+    name = arguments.target
+    if name not in TARGETS:
+        sys.exit(f"no target {name!r}; targets are {', '.join(TARGETS)}, all")
+    corpus = arguments.corpus / name
     corpus.mkdir(parents=True, exist_ok=True)
+    run: Callable[[bytes], None] = TARGETS[name].hypothesis.fuzz_one_input  # type: ignore[attr-defined]
+    if name in settings_files.targets() and not arguments.damage:
+        run = partial(settings_files.read_content, name=name)
+        corpus = corpus / "content"
+        corpus.mkdir(exist_ok=True)
+        for number, content in enumerate(settings_files.seeds(name)):
+            (corpus / f"good-{number}").write_bytes(content)
     warnings.simplefilter("error")
     options = [
         f"-runs={arguments.runs}",
@@ -37,10 +81,38 @@ def main() -> None:
         f"-artifact_prefix={corpus}/",
         "-timeout=20",
         "-rss_limit_mb=4096",
+        "-max_len=8192",
     ]
     inputs = [str(path) for path in arguments.inputs] or [str(corpus)]
-    atheris.Setup([sys.argv[0], *options, *inputs], TARGETS[arguments.target].hypothesis.fuzz_one_input)  # type: ignore[attr-defined]
+    atheris.Setup([sys.argv[0], *options, *inputs], run)
     atheris.Fuzz()
+
+
+def fuzz_all(arguments: argparse.Namespace) -> None:
+    """Fuzz all targets one after another, and print a line of a table for each."""
+    from tests.fuzz.targets import TARGETS
+
+    print("| target | inputs | s | failed |\n|---|--:|--:|---|", flush=True)
+    for name in TARGETS:
+        options = [
+            f"--runs={arguments.runs}",
+            f"--seconds={arguments.seconds}",
+            f"--corpus={arguments.corpus}",
+        ]
+        started = time.monotonic()
+        finished = subprocess.run(
+            [sys.executable, "-m", "tests.fuzz", name, *options, *["--damage"][: arguments.damage]],
+            stderr=subprocess.STDOUT,
+            stdout=subprocess.PIPE,
+            text=True,
+            errors="replace",
+        )
+        inputs = [
+            int(number) for number in re.findall(r"^(?:#|Done )([0-9]+)", finished.stdout, re.MULTILINE)
+        ]
+        failed = finished.stdout.strip().rpartition("\n")[2] if finished.returncode else "none"
+        seconds = time.monotonic() - started
+        print(f"| {name} | {max(inputs, default=0)} | {seconds:.0f} | {failed} |", flush=True)
 
 
 if __name__ == "__main__":

@@ -122,10 +122,12 @@ def _load_run(folder: Path, dataset: Path | None) -> Results:
     splits = read_splits(_splits_of(folder))
     if not 0 <= fold < len(splits):
         raise RunError(f"there is no fold {fold} in its splits", path=folder)
+    dataset_folder = dataset or _find_dataset(folder, config.dataset, False)
+    check_contents(folder, contents_of_run(dataset_folder, splits[fold]))
     return _gather(
         [comparison_folder.read_run(run, method, 0)],
         config,
-        dataset or _find_dataset(folder, config.dataset, False),
+        dataset_folder,
         (splits[fold],),
         lambda _, __: run.predictions,
     )
