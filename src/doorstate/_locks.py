@@ -18,10 +18,12 @@ from pathlib import Path
 
 from filelock import FileLock, Timeout
 
+from doorstate._documents import read_json
 from doorstate._files import LOCK_PREFIX, check_writable, is_scratch, write_text
-from doorstate.errors import FolderInUseError
+from doorstate.errors import DoorstateError, FolderInUseError
 
 _WAIT_S = 2.0  # workers of a killed process end within this time
+_MAX_RECORD_BYTES = 10_000
 _POLL_S = 0.05
 _STALE_S = 60.0  # age of a temporary file that nobody writes
 
@@ -112,9 +114,9 @@ def _record() -> str:
 
 def _in_use(folder: Path, owner: Path) -> FolderInUseError:
     try:
-        record = json.loads(owner.read_text(encoding="utf-8"))
+        record = read_json(owner, max_bytes=_MAX_RECORD_BYTES)
         who = f"process {int(record['process'])} on {record['host']} since {record['started']}"
-    except (OSError, ValueError, KeyError, TypeError):
+    except (DoorstateError, ValueError, KeyError, TypeError):
         who = "another process"  # which has not written its record yet
     return FolderInUseError(
         f"is in use by {who}", path=folder, hint="wait for it or end it, or choose another folder"

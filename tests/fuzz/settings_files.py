@@ -22,10 +22,10 @@ from doorstate.dataset.store import DatasetDescription, open_dataset
 from doorstate.evaluation.predictions import load_results
 from doorstate.inference.backends.onnx_backend import INPUT, OUTPUT, OnnxBackend
 from doorstate.networks.card import CARD_KEY, WeightsCard
-from doorstate.simulation.camera import DepthCamera
-from doorstate.simulation.frames import replay
 from doorstate.networks.card_file import read_card
 from doorstate.networks.weights import load_weights
+from doorstate.simulation.camera import DepthCamera
+from doorstate.simulation.frames import replay
 from doorstate.simulation.manifest import flatten, unflatten
 from doorstate.simulation.presets import PRESETS, PresetName, draw_rows
 from doorstate.simulation.row import Row

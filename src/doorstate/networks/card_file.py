@@ -21,7 +21,9 @@ def read_card(path: Path) -> WeightsCard:
     try:
         return WeightsCard.parse(read_header(path).metadata[CARD_KEY])
     except KeyError as error:
-        raise WeightsError("has no valid card: not a weights file of doorstate", path=path) from error
+        raise WeightsError("has no card: not a weights file of doorstate", path=path) from error
+    except WeightsError as error:
+        raise error if error.path is not None else error.located(path) from error
 
 
 def check_card(card: WeightsCard, path: Path) -> None:
