@@ -4,9 +4,11 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
+import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from typing import Any
 
 from typer.core import TyperCommand
@@ -16,6 +18,8 @@ from doorstate.cli.flags import format_flag
 from doorstate.errors import ConfigError, DoorstateError
 
 CLOSED_PIPE = 141  # exit code of programs that SIGPIPE ends
+TERMINATED = 128 + signal.SIGTERM
+_ENDS_ITSELF = {"serve"}  # its server handles SIGTERM
 _RESUMABLE = {"simulate", "prepare", "train", "compare", "resolution", "transfer"}
 
 
@@ -31,15 +35,41 @@ class Command(TyperCommand):
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command; an interrupt or a closed pipe ends it before typer handles them without a word."""
+        advice = "; run the same command again to continue" if self.name in _RESUMABLE else ""
         try:
-            return super().invoke(ctx)
+            with nullcontext() if self.name in _ENDS_ITSELF else _termination():
+                return super().invoke(ctx)
         except KeyboardInterrupt:
-            advice = "; run the same command again to continue" if self.name in _RESUMABLE else ""
             _print_error(f"interrupted{advice}")
             raise SystemExit(130) from None
+        except _Terminated:
+            _print_error(f"terminated{advice}")
+            raise SystemExit(TERMINATED) from None
         except BrokenPipeError:
             _discard_output()
             raise SystemExit(CLOSED_PIPE) from None
+
+
+class _Terminated(BaseException):
+    """SIGTERM, raised in the main thread as KeyboardInterrupt is, so that files and workers are cleaned up."""
+
+
+@contextmanager
+def _termination() -> Iterator[None]:
+    """Raise `_Terminated` on the first SIGTERM; a second one ends the process at once."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def terminate(*_: object) -> None:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        raise _Terminated
+
+    before = signal.signal(signal.SIGTERM, terminate)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 @contextmanager
@@ -56,9 +86,13 @@ def reported_errors() -> Iterator[None]:
     except BrokenPipeError:
         _discard_output()
         sys.exit(CLOSED_PIPE)
+    except MemoryError:
+        _print_error("there is not enough memory")
+        sys.exit(1)
     except OSError as error:
         if error.filename is not None:
-            raise
+            _print_error(f"{error.filename}: cannot be used ({error.strerror or error})")
+            sys.exit(1)
         _discard_output()
         _print_error(f"the output cannot be written ({error.strerror or error})")
         sys.exit(1)

@@ -100,12 +100,14 @@ def compare(
 
 def compare_with_display(experiment: Experiment, folder: Path, jobs: int) -> list[dict[str, Any]]:
     """Run a comparison with a live display of its progress, and return the metrics of each run."""
+    from doorstate._locks import owned_folder
     from doorstate.cli.run_display import live_runs
     from doorstate.training.comparison import compare as run_comparison
     from doorstate.training.comparison import plan_runs
 
     recipes = {network: experiment.recipe_of(network) for network in experiment.networks}
-    with live_runs(plan_runs(experiment, folder), recipes, experiment.num_points, jobs) as progress:
+    runs = plan_runs(experiment, folder)
+    with owned_folder(folder), live_runs(runs, recipes, experiment.num_points, jobs) as progress:
         return run_comparison(experiment, folder, jobs, progress)
 
 

@@ -47,6 +47,7 @@ def train(
       doorstate train --network dgcnn --data data/ogurob-4096 --recipe authors --set batch_size=16 --out runs/dgcnn
       doorstate train --network pointnet2 --data data/varied-4096 --head door --head angle --out runs/heads
     """
+    from doorstate._locks import owned_folder
     from doorstate.cli.console import print_json, stdout
     from doorstate.cli.run_display import live_runs
     from doorstate.dataset.store import open_dataset
@@ -68,7 +69,10 @@ def train(
     }
     experiment = load_experiment(None, settings)
     runs = [RunSpec(network, fold, RunFolder(out))]
-    with live_runs(runs, {network: experiment.recipe_of(network)}, experiment.num_points, 1):
+    with (
+        owned_folder(out),
+        live_runs(runs, {network: experiment.recipe_of(network)}, experiment.num_points, 1),
+    ):
         metrics = train_alone(experiment, out, dataset, network, fold)
     if as_json:
         print_json(metrics)
