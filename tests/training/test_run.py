@@ -24,6 +24,7 @@ from tests.training.runs import RECIPE, run_config
 def test_files_of_a_finished_run(finished_run: Path, fold_roles: dict[str, Role]) -> None:
     assert sorted(path.name for path in finished_run.iterdir()) == [
         "config.json",
+        "digests.json",
         "environment.json",
         "log.csv",
         "metrics.json",

@@ -30,8 +30,10 @@ def contents_of_run(
     Raises:
         DatasetError: a file cannot be read.
     """
-    start = {} if start_from is None else {_START: file_digest(Path(start_from))}
-    return _of_datasets(dataset, extra_datasets) | {_SPLITS: roles_digest(roles)} | start
+    contents = _of_datasets(dataset, extra_datasets) | {_SPLITS: roles_digest(roles)}
+    if start_from is not None and Path(start_from).is_file():  # a missing one is refused where it is read
+        contents[_START] = file_digest(Path(start_from))
+    return contents
 
 
 def contents_of_comparison(
