@@ -20,7 +20,7 @@ from torch import nn
 from doorstate._files import read_csv
 from doorstate.dataset.store import DatasetDescription, open_dataset
 from doorstate.evaluation.predictions import load_results
-from doorstate.inference.backends.onnx_backend import INPUT, OUTPUT, OnnxBackend
+from doorstate.inference.backends.onnx_backend import INPUT, PROBABILITIES, OnnxBackend
 from doorstate.networks.card import CARD_KEY, WeightsCard
 from doorstate.networks.card_file import read_card
 from doorstate.networks.weights import load_weights
@@ -162,7 +162,7 @@ def _read_weights(path: Path) -> None:
 
 
 def _open_network(path: Path) -> None:
-    assert OnnxBackend(path, threads=1).num_points > 0
+    assert OnnxBackend(path, threads=1).card.num_points > 0
 
 
 def _load_checkpoint(path: Path) -> None:
@@ -199,8 +199,8 @@ def _weights_file(card: bytes) -> bytes:
 
 def _onnx_file(card: bytes) -> bytes:
     points = helper.make_tensor_value_info(INPUT, TensorProto.FLOAT, ["batch", "points", 3])
-    probabilities = helper.make_tensor_value_info(OUTPUT, TensorProto.FLOAT, ["batch", "points", 3])
-    node = helper.make_node("Softmax", [INPUT], [OUTPUT])
+    probabilities = helper.make_tensor_value_info(PROBABILITIES, TensorProto.FLOAT, ["batch", "points", 3])
+    node = helper.make_node("Softmax", [INPUT], [PROBABILITIES])
     model = helper.make_model(
         helper.make_graph([node], "g", [points], [probabilities]),
         opset_imports=[helper.make_opsetid("", 17)],
