@@ -13,7 +13,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from doorstate._files import write_text
 
 from ..paths import DOCS, TITLES
-from . import generalization, real, related, results, zoo
+from . import commands, generalization, real, related, results, zoo
 
 PAGES: Mapping[str, Callable[[], Mapping[str, Any]]] = {
     "results": results.content,
@@ -21,6 +21,7 @@ PAGES: Mapping[str, Callable[[], Mapping[str, Any]]] = {
     "generalization": generalization.content,
     "real": real.content,
     "zoo": zoo.content,
+    "commands": commands.content,
 }
 """Values that the template of each page uses."""
 
