@@ -18,7 +18,7 @@ import numpy as np
 
 from benchmarks.clouds import raw_cloud
 from benchmarks.store import Result
-from benchmarks.timing import format_ms, resident_mib
+from benchmarks.timing import format_ms, tree_resident_mib
 from doorstate._jobs import Progress
 from doorstate.errors import RunError
 from doorstate.evaluation.table import Table
@@ -81,7 +81,7 @@ def service_table(rows: Sequence[Result]) -> Table:
 def _row(process: subprocess.Popen[str], port: int, cloud: bytes, clients: int, seconds: float) -> Result:
     with ThreadPoolExecutor(clients) as threads:
         list(threads.map(lambda _: _send(port, cloud, 0.0), range(clients)))
-        before_mib, started = resident_mib(process.pid), time.perf_counter()
+        before_mib, started = tree_resident_mib(process.pid), time.perf_counter()
         requests = [
             request
             for client in threads.map(lambda _: _send(port, cloud, seconds), range(clients))
@@ -98,7 +98,7 @@ def _row(process: subprocess.Popen[str], port: int, cloud: bytes, clients: int, 
         "clouds_per_s": len(answered_ms) / elapsed_s,
         "p50_ms": float(p50_ms),
         "p99_ms": float(p99_ms),
-        "memory_mib": [before_mib, resident_mib(process.pid)],
+        "memory_mib": [before_mib, tree_resident_mib(process.pid)],
     }
 
 

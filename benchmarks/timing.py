@@ -91,6 +91,16 @@ def resident_mib(process: int | str = "self") -> float:
     return _status_mib("VmRSS", process)
 
 
+def tree_resident_mib(process: int) -> float:
+    """Return the memory of a process and its children; pages that they share count in each."""
+    children = Path(f"/proc/{process}/task/{process}/children")
+    try:
+        numbers = children.read_text(encoding="ascii").split()
+    except OSError:
+        numbers = []
+    return resident_mib(process) + sum(tree_resident_mib(int(number)) for number in numbers)
+
+
 def peak_resident_mib() -> float:
     """Return the highest memory of this process since the last `reset_peak`."""
     return _status_mib("VmHWM", "self")

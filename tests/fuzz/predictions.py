@@ -23,9 +23,12 @@ from doorstate.inference.rule_predictor import RulePredictor
 from doorstate.inference.serialization import prediction_to_dict
 from doorstate.io.formats import CLOUD_SUFFIXES
 from doorstate.rules import list_rules
+from doorstate.serving.access import Access
 from doorstate.serving.app import create_app
 from doorstate.serving.errors import STATUS_DESCRIPTIONS
-from doorstate.serving.work_queue import Limits
+from doorstate.serving.limits import Limits
+from doorstate.serving.work_queue import WorkQueue
+from doorstate.serving.worker import Job, Method, Reply, predict_file
 from doorstate.types import STATES, Points
 from tests.fuzz.examples import CLOUDS, files, saved
 from tests.fuzz.harness import Target, check_line, fuzz_target, outcome_of
@@ -112,9 +115,28 @@ def predict_with_rule(cloud: Points, gate: Gate | None, rule: str) -> str:
     return outcome_of(lambda: _predict(predictor, cloud, 1 if gate is None else gate.min_points))
 
 
+class _LocalQueue(WorkQueue):
+    """Queue that reads and predicts in this process, so that faults are found here."""
+
+    def __init__(self) -> None:
+        self.limits = Limits(max_bytes=_MAX_BYTES, workers=1)
+
+    problem = ""
+    waiting = 0
+
+    def check_space(self) -> None:
+        """There is always space."""
+
+    def wait_until_ready(self) -> Method:
+        return Method("pointnet", network="pointnet")
+
+    async def run(self, job: Job, client: str) -> Reply:
+        return predict_file(_network(DEFAULT_GATE), job, self.limits.max_bytes)
+
+
 @cache
 def _app() -> Any:
-    return create_app(_network(DEFAULT_GATE), Limits(max_bytes=_MAX_BYTES, workers=1))
+    return create_app(_LocalQueue(), Access(("test",)))
 
 
 async def _post(content: bytes, query: str, headers: list[tuple[bytes, bytes]]) -> httpx.Response:

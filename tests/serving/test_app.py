@@ -192,7 +192,7 @@ def test_requests_in_the_docs_succeed(client: httpx.Client, tmp_path: Path) -> N
     (tmp_path / "cloud.npy").write_bytes(NPY)
     Image.fromarray(np.full((480, 640), 2000, np.uint16)).save(tmp_path / "depth.png")
     text = (Path(__file__).resolve().parents[2] / "docs" / "service.md").read_text(encoding="utf-8")
-    commands = re.findall("^curl .*", text, flags=re.MULTILINE)
+    commands = re.findall(r"^curl .*127\.0\.0\.1.*", text, flags=re.MULTILINE)
     assert len(commands) == 4
     for command in commands:
         arguments = shlex.split(command.replace("http://127.0.0.1:8000", str(client.base_url)))

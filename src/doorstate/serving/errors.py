@@ -19,6 +19,7 @@ STATUS_DESCRIPTIONS = {
     400: "The file is damaged, or a parameter is wrong.",
     401: "A bearer token is needed.",
     408: "No part of the file arrived for some seconds.",
+    411: "A large file needs a Content-Length.",
     413: "The file is too large, or needs too much memory.",
     415: "The format of the file is missing or unknown.",
     421: "The Host header names another machine.",

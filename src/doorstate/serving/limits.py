@@ -20,8 +20,10 @@ class Limits:
         work_timeout_s: time to read and predict one file; a worker that takes longer is killed.
         quick_timeout_s: time after which a file is taken for large, and started again as such.
         large_bytes: files from this size on have one more worker, of low priority, to themselves.
+        large_text_bytes: the same for text, which takes longer to read.
         head_timeout_s: time for the head of a request.
         stall_timeout_s: time between two parts of an upload.
+        large_uploads: number of large files that are received at the same time; others wait unread.
         bytes_in_flight: bytes of all files that were received and are not answered.
         connections: number of open connections.
         client_connections: number of open connections of one address.
@@ -35,8 +37,10 @@ class Limits:
     work_timeout_s: float = 10.0
     quick_timeout_s: float = 2.0
     large_bytes: int = 4 * 2**20
+    large_text_bytes: int = 256 * 2**10
     head_timeout_s: float = 5.0
     stall_timeout_s: float = 3.0
+    large_uploads: int = 2
     bytes_in_flight: int = 160 * 2**20
     connections: int = 512
     client_connections: int = 128

@@ -9,10 +9,11 @@ from contextlib import suppress
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 _LINGER_S = 2.0
+_LINGER_BYTES = 2**20
 
 
 class LingeringClose:
-    """ASGI middleware: after an early response, discard the rest of the request for two seconds, then close.
+    """ASGI middleware: after an early response, discard the rest of the request for two seconds or 1 MiB, then close.
 
     Closing at once would reset the connection, and the client might never see the response (RFC 9112, section 9.6).
     """
@@ -41,8 +42,9 @@ class LingeringClose:
                 message = {"type": "http.response.body", "body": b""}
                 with suppress(TimeoutError):
                     async with asyncio.timeout(_LINGER_S):
-                        while unread:
-                            await tracked_receive()
+                        discarded = 0
+                        while unread and discarded < _LINGER_BYTES:
+                            discarded += len((await tracked_receive()).get("body", b""))
             await send(message)
 
         await self._app(scope, tracked_receive, lingering_send)

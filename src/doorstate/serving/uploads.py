@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import Counter
+from contextlib import AsyncExitStack
 
 from fastapi import HTTPException, Request
 
@@ -25,6 +26,7 @@ class Uploads:
     def __init__(self, limits: Limits) -> None:
         self._limits = limits
         self._open: dict[_Upload, None] = {}
+        self._large = asyncio.Semaphore(limits.large_uploads)
         self._client_bytes: Counter[str] = Counter()
         self.total_bytes = 0
 
@@ -32,16 +34,22 @@ class Uploads:
         """Return the body of a request, whose bytes count until `release`.
 
         Raises:
-            HTTPException: 400 length that is no number, 408 too slow, 413 too large, 503 too many bytes.
+            HTTPException: 400 length that is no number, 408 too slow, 411 large without a length, 413 too large,
+                503 too many bytes.
             ClientDisconnect: the client closed the connection.
         """
-        _check_declared(request, self._limits.max_bytes)
+        declared = _declared(request, self._limits.max_bytes)
         upload = _Upload(request.client.host if request.client else "", self._limits.stall_timeout_s)
         self._open[upload] = None
         try:
-            async with asyncio.timeout(self._limits.stall_timeout_s) as upload.deadline:
+            async with AsyncExitStack() as stack:
+                if declared >= self._limits.large_bytes:
+                    await self._wait_for_place(stack)
+                upload.deadline = await stack.enter_async_context(asyncio.timeout(upload.patience_s))
                 async for chunk in request.stream():
                     self._add(upload, chunk)
+                    if upload.is_large(self._limits.large_bytes) and declared < self._limits.large_bytes:
+                        raise HTTPException(411, "a large file needs a Content-Length")
         except TimeoutError as error:
             self.release(upload)
             raise HTTPException(408, f"no part of the file arrived for {upload.patience_s:g} s") from error
@@ -51,6 +59,14 @@ class Uploads:
         finally:
             del self._open[upload]
         return upload
+
+    async def _wait_for_place(self, stack: AsyncExitStack) -> None:
+        """Take one of the places of large uploads until the stack is closed; meanwhile nothing of it is received."""
+        try:
+            async with asyncio.timeout(self._limits.stall_timeout_s):
+                await stack.enter_async_context(self._large)
+        except TimeoutError as error:
+            raise _busy() from error
 
     def release(self, upload: Upload) -> None:
         """Stop counting the bytes of an upload."""
@@ -62,7 +78,7 @@ class Uploads:
             raise _too_large(self._limits.max_bytes)
         while self._is_full(upload, len(chunk)):
             if not self._end_idle(upload):
-                raise HTTPException(503, "too many files are being received", {"Retry-After": "1"})
+                raise _busy()
         upload.content += chunk
         self._count(upload, len(chunk))
         upload.progress()
@@ -118,18 +134,27 @@ class _Upload(Upload):
         if self.deadline is not None:
             self.deadline.reschedule(self.last_s + self.patience_s)
 
+    def is_large(self, size: int) -> bool:
+        return len(self.content) >= size
+
     def end(self) -> None:
         if self.deadline is not None and not self.deadline.expired():
             self.deadline.reschedule(asyncio.get_running_loop().time())
 
 
-def _check_declared(request: Request, limit: int) -> None:
+def _declared(request: Request, limit: int) -> int:
+    """Return the number of bytes that the head of a request announces; 0 if it does not."""
     try:
         declared = int(request.headers.get("content-length", 0))
     except ValueError as error:
         raise HTTPException(400, "Content-Length is not a number") from error
     if declared > limit:
         raise _too_large(limit)
+    return declared
+
+
+def _busy() -> HTTPException:
+    return HTTPException(503, "too many files are being received", {"Retry-After": "1"})
 
 
 def _too_large(limit: int) -> HTTPException:

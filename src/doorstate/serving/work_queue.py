@@ -15,6 +15,8 @@ from doorstate.serving.limits import Limits
 from doorstate.serving.worker import LOW_PRIORITY, Job, LoadPredictor, Method, Reply, Worker
 
 _SLOW_S = 60.0
+_TEXT = bytes([*range(32, 127), *b"\t\r\n"])
+_TEXT_SAMPLE = 4096
 
 
 class WorkQueue:
@@ -45,13 +47,19 @@ class WorkQueue:
             HTTPException: 503, too many files wait.
         """
         now = time.monotonic()
-        if len(job.content) < self.limits.large_bytes and self._slow_until.get(client, 0.0) < now:
+        if not self._is_large(job) and self._slow_until.get(client, 0.0) < now:
             reply = await self._quick.run(job, min(self.limits.quick_timeout_s, self.limits.work_timeout_s))
             if reply.status != 504:
                 return reply
             self._slow_until = {name: until for name, until in self._slow_until.items() if until > now}
             self._slow_until[client] = now + _SLOW_S
         return await self._large.run(job, self.limits.work_timeout_s)
+
+    def _is_large(self, job: Job) -> bool:
+        size = len(job.content)
+        return size >= self.limits.large_bytes or (
+            size >= self.limits.large_text_bytes and _is_text(job.content)
+        )
 
     def check_space(self) -> None:
         """Refuse an upload that would have to wait with too many others.
@@ -83,6 +91,12 @@ class WorkQueue:
         """Drop the waiting files, and end the workers."""
         self._quick.close()
         self._large.close()
+
+
+def _is_text(content: bytes) -> bool:
+    """Return whether a file starts as one of text; binary files have only a short header of text."""
+    start = content[:_TEXT_SAMPLE]
+    return start.isascii() and not start.translate(None, _TEXT)
 
 
 class _Lane:
