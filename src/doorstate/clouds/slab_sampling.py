@@ -30,18 +30,18 @@ def slab_farthest_points(points: Points, count: int, height: int) -> Indices:
         count: number of rows to choose, with the start.
         height: height of the k-d tree that breaks ties.
     """
-    axis = int(np.ptp(points, axis=0).argmax())
-    sorted_rows = points[:, axis].argsort(kind="stable")
-    along: list[float] = points[sorted_rows, axis].tolist()
+    axes = np.ascontiguousarray(points.T)
+    longest = axes[int(np.ptp(axes, axis=1).argmax())]
+    sorted_rows: Indices = longest.argsort(kind="stable")
+    along: list[float] = longest[sorted_rows].tolist()
     num_blocks = -(-len(points) // _BLOCK)
     padded = num_blocks * _BLOCK
     xyz = np.zeros((3, padded), np.float32)
-    xyz[:, : len(points)] = points[sorted_rows].T
-    columns = [column[:, None] for column in np.ascontiguousarray(xyz.T)]
+    xyz[:, : len(points)] = axes.take(sorted_rows, axis=1)
     # One integer orders points by distance, and equal distances by leaf order: the bits of a float32 that is not
     # negative order as integers do, and stand above the bits of N - 1 - rank. Padding is lowest of all.
     keys, keys_now = np.full((2, padded), -1, np.int64)
-    keys_now[: len(points)] = len(points) - 1 - _leaf_ranks(points, height)[sorted_rows]
+    keys_now[: len(points)] = len(points) - 1 - _leaf_ranks(axes, height)[sorted_rows]
     keys[: len(points)] = keys_now[: len(points)] | _FARTHEST
     squared, squared_now = (array.view(np.float32)[_HIGH_HALF::2] for array in (keys, keys_now))
     blocks = keys.reshape(num_blocks, _BLOCK)
@@ -56,7 +56,7 @@ def slab_farthest_points(points: Points, count: int, height: int) -> Indices:
         last = (bisect_right(along, along[position] + reach) - 1) // _BLOCK + 1
         start, stop = first * _BLOCK, min(last * _BLOCK, len(points))
         slab = difference[:, start:stop]
-        np.subtract(xyz[:, start:stop], columns[position], out=slab)
+        np.subtract(xyz[:, start:stop], xyz[:, position, None], out=slab)
         np.multiply(slab, slab, out=slab)
         np.add(x[start:stop], y[start:stop], out=x[start:stop])
         np.add(x[start:stop], z[start:stop], out=squared_now[start:stop])
@@ -66,28 +66,34 @@ def slab_farthest_points(points: Points, count: int, height: int) -> Indices:
         position = block * _BLOCK + int(blocks[block].argmax())
         reach = math.sqrt(squared[position]) * _WIDER
         chosen.append(position)
-    return sorted_rows[chosen]
+    rows: Indices = sorted_rows[chosen]
+    return rows
 
 
-def _leaf_ranks(points: Points, height: int) -> Indices:
-    """Return the rank (N,) of each row in the leaves of a k-d tree that splits at the mean of the longest side."""
-    leaves = [np.arange(len(points))]
+def _leaf_ranks(axes: Points, height: int) -> Indices:
+    """Return the rank (N,) of each point in the leaves of a k-d tree that splits at the mean of the longest side.
+
+    Args:
+        axes: (3, N) coordinates.
+        height: number of splits from the root to a leaf.
+    """
+    leaves = [np.arange(axes.shape[1])]
     for _ in range(height):
         halves: list[Indices] = []
         for leaf in leaves:
-            halves += _split_at_mean(points, leaf) if len(leaf) > 1 else [leaf]
+            halves += _split_at_mean(axes, leaf) if len(leaf) > 1 else [leaf]
         leaves = halves
-    ranks = np.empty(len(points), dtype=np.int64)
-    ranks[np.concatenate(leaves)] = np.arange(len(points))
+    ranks = np.empty(axes.shape[1], dtype=np.int64)
+    ranks[np.concatenate(leaves)] = np.arange(len(ranks))
     return ranks
 
 
-def _split_at_mean(points: Points, leaf: Indices) -> list[Indices]:
-    values = points[leaf]
-    axis = int((values.max(axis=0) - values.min(axis=0)).argmax())
+def _split_at_mean(axes: Points, leaf: Indices) -> list[Indices]:
+    values = axes.take(leaf, axis=1)
+    longest = values[(values.max(axis=1) - values.min(axis=1)).argmax()]
     # A running float32 sum, not NumPy's pairwise one, to split at the same place as fpsample.
-    mean = np.cumsum(values[:, axis], dtype=np.float32)[-1] / np.float32(len(leaf))
-    upper = values[:, axis] >= mean
+    mean = np.cumsum(longest, dtype=np.float32)[-1] / np.float32(len(leaf))
+    upper = longest >= mean
     middle = len(leaf) - int(np.count_nonzero(upper))
     # Hoare's partition swaps the k-th misplaced row from the left with the k-th misplaced row from the right.
     misplaced_left = np.flatnonzero(upper[:middle])
