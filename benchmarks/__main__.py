@@ -281,7 +281,7 @@ def _parse_integers(option: str, text: str, minimum: int) -> list[int]:
 
 def _settings(**options: Any) -> dict[str, Any]:
     """Return everything that results depend on: machine, versions and options."""
-    from doorstate.training.environment import describe_environment
+    from doorstate._environment import describe_environment
 
     return describe_environment() | options
 

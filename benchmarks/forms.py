@@ -13,9 +13,10 @@ from torch import Tensor, nn
 from benchmarks.ports import build_port
 from benchmarks.pyg import NETWORKS as PYG_NETWORKS
 from benchmarks.pyg import build_pyg
+from doorstate._environment import has_fast_bf16
 from doorstate.networks import create_network
 from doorstate.networks.base import PointNetwork
-from doorstate.training.environment import compile_if_possible, has_fast_bf16
+from doorstate.training.environment import compile_if_possible
 
 _PLAIN_FORMS = Path(__file__).resolve().parents[1] / "tests" / "networks"
 

@@ -14,9 +14,9 @@ from benchmarks.measured_network import MeasuredNetwork, NetworkTask
 from benchmarks.store import Result
 from benchmarks.timing import format_ms
 from benchmarks.workers import Worker
+from doorstate._environment import has_fast_bf16
 from doorstate._jobs import Progress
 from doorstate.evaluation.table import UNDEFINED, Table
-from doorstate.training.environment import has_fast_bf16
 
 # An operator belongs to the first group with a part of its name.
 GROUPS: dict[str, tuple[str, ...]] = {

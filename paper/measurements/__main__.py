@@ -90,8 +90,8 @@ def export(
 
 def _write(table: Table, path: Path, **options: object) -> None:
     """Write a table with the machine, versions and options it was made with."""
+    from doorstate._environment import describe_environment
     from doorstate._files import write_text
-    from doorstate.training.environment import describe_environment
 
     settings = ", ".join(
         f"{name} {value}" for name, value in (describe_environment() | options).items() if value != ""

@@ -20,7 +20,7 @@ REPEATS = 20  # of the selected prediction: the fastest one is least disturbed b
 
 def draw() -> bytes:
     """Return a screenshot as PNG; it shows a time, so run it on an idle machine."""
-    predictor = Predictor.load()
+    predictor = Predictor.load(backend="torch")  # shows which points decided
     predictor.warm_up()
     readers = find_named_clouds([paths.RESULTS / "datasets" / "ogurob-4096"])[::EVERY]
     entries = [make_entry(predictor, read()) for read in readers]

@@ -37,7 +37,8 @@ def read_json(
     value = _located(lambda: parse_json(read_input_text(path, max_bytes, error), error), path)
     if not isinstance(value, dict):
         raise error("holds no JSON object", path=path)
-    return value
+    content: dict[str, Any] = value
+    return content
 
 
 def parse_json(text: str, error: type[DoorstateError] = RunError) -> Any:

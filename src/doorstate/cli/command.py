@@ -15,7 +15,7 @@ from typer.core import TyperCommand
 
 from doorstate.cli.choices import fill_in
 from doorstate.cli.flags import format_flag
-from doorstate.errors import ConfigError, DoorstateError
+from doorstate.errors import ConfigError, DoorstateError, needs_extra
 
 CLOSED_PIPE = 141  # exit code of programs that SIGPIPE ends
 TERMINATED = 128 + signal.SIGTERM
@@ -77,7 +77,8 @@ def reported_errors() -> Iterator[None]:
     """Print an error of this package, or of writing to standard output, as one line, and end the program."""
     try:
         try:
-            yield
+            with needs_extra("this command"):
+                yield
         finally:
             sys.stdout.flush()
     except DoorstateError as error:

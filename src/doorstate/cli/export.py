@@ -41,7 +41,7 @@ def export(
     from doorstate.cli.console import stdout
     from doorstate.cli.predictors import Methods, only_method
     from doorstate.cli.progress import progress_bar
-    from doorstate.inference.export import TOLERANCE, check_export_packages, export_onnx
+    from doorstate.inference.export import TOLERANCE, export_onnx
     from doorstate.inference.reference_clouds import reference_clouds
     from doorstate.networks.card_file import read_card
     from doorstate.networks.packaged import packaged_weights
@@ -50,7 +50,6 @@ def export(
     name, source = only_method(Methods(network, weights))
     if out is not None and out.suffix != ".onnx":
         raise ConfigError(f"--out {out}: expected a .onnx file")
-    check_export_packages()
     file = source if isinstance(source, Path) else packaged_weights(name)
     path = out or Path(f"{read_card(file).network if source == file else name}{'-int8' if int8 else ''}.onnx")
     check_writable(path)

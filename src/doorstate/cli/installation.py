@@ -15,10 +15,10 @@ _REQUIREMENT = re.compile(r"([\w.-]+)[^;]*;.*\bextra\s*==\s*['\"]([\w-]+)['\"]")
 
 def describe_installation() -> dict[str, str | int | None]:
     """Return versions and the machine; None is a package that is not installed."""
+    from doorstate._environment import processor_name
     from doorstate._jobs import default_workers
     from doorstate.clouds.samplers import choose_sampler
     from doorstate.inference.backends.threads import default_threads
-    from doorstate.training.environment import processor_name
 
     return {
         "doorstate": __version__,

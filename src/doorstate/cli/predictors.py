@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from doorstate.cli.choices import split_names
-from doorstate.errors import ConfigError
+from doorstate.errors import ConfigError, is_installed
 
 if TYPE_CHECKING:
     from doorstate.inference.predictor import Predictor
@@ -51,10 +51,12 @@ def load_predictors(
     *,
     budget_ms: float | None = None,
     threads: int | None = None,
+    for_view: bool = False,
 ) -> dict[str, Predictor]:
     """Load and warm up the networks and rules by name; the default network if none is named.
 
-    Points and time budget are those of the networks; beside networks, rules use all points.
+    Points and time budget are those of the networks; beside networks, rules use all points. With `for_view` torch runs
+    packaged networks where it is installed, because only torch shows which points decided.
 
     Raises:
         ConfigError: options exclude each other.
@@ -77,6 +79,7 @@ def load_predictors(
                 num_points=None if is_plain else points,
                 budget_ms=None if is_plain else budget_ms,
                 threads=threads,
+                backend="torch" if isinstance(choice, str) and for_view and is_installed("torch") else None,
             )
             predictor.warm_up()
         _warn_about_points(name, predictor, points)
@@ -90,6 +93,7 @@ def load_predictor(
     *,
     budget_ms: float | None = None,
     threads: int | None = None,
+    for_view: bool = False,
 ) -> Predictor:
     """Load and warm up one network or rule, for commands that use one.
 
@@ -98,7 +102,7 @@ def load_predictor(
         DoorstateError: see `Predictor.load`.
     """
     name, _ = only_method(methods)
-    return load_predictors(methods, points, budget_ms=budget_ms, threads=threads)[name]
+    return load_predictors(methods, points, budget_ms=budget_ms, threads=threads, for_view=for_view)[name]
 
 
 def only_method(methods: Methods) -> tuple[str, Path | str | None]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from doorstate.cli.options import BudgetMs, NetworkNames, PointCount, RuleNames, Threads, WeightsFiles
-from doorstate.errors import missing_extra
+from doorstate.errors import needs_extra
 
 if TYPE_CHECKING:
     from doorstate.cli.predictors import Methods
@@ -75,14 +75,12 @@ def serve(
       DOORSTATE_TOKEN=secret doorstate serve --host 0.0.0.0 --allow-host robot.local
       curl --data-binary @cloud.pcd 'http://127.0.0.1:8000/predict?format=pcd'
     """
-    try:
+    with needs_extra("serve"):
         from doorstate.serving.access import Access
         from doorstate.serving.app import create_app
         from doorstate.serving.limits import Limits
         from doorstate.serving.server import create_server, listen, stop_on_signals
         from doorstate.serving.work_queue import WorkQueue
-    except ImportError as error:
-        raise missing_extra("serve", "fastapi", "uvicorn", "prometheus_client") from error
     from doorstate._jobs import default_workers
     from doorstate.cli.console import stderr
     from doorstate.cli.predictors import Methods

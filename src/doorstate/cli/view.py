@@ -115,7 +115,7 @@ def view(
         source = nullcontext(_find_files(files or [], options, every))
     with source as (clouds, total):
         predictor = load_predictor(
-            Methods(network, weights, rule), points, budget_ms=budget_ms, threads=threads
+            Methods(network, weights, rule), points, budget_ms=budget_ms, threads=threads, for_view=True
         )
         if live:
             show_live(predictor, clouds, port, open_browser)

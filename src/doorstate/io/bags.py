@@ -14,7 +14,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from doorstate.errors import CameraError, CloudReadError, DoorstateError, missing_extra, summarize_exception
+from doorstate.errors import CameraError, CloudReadError, DoorstateError, needs_extra, summarize_exception
 from doorstate.io.bag_formats import CDR, ROS1, any_profile, encoding_of, ros2_name
 from doorstate.io.bag_limits import (
     check_files,
@@ -67,12 +67,10 @@ def open_bag(path: Path) -> Iterator[Bag]:
         MissingExtraError: the package rosbags is not installed.
         CloudReadError: no bag, or damaged.
     """
-    try:
+    with needs_extra("a ROS bag"):
         from rosbags.rosbag1 import Reader as Reader1
         from rosbags.rosbag2 import Reader as Reader2
         from rosbags.typesys import Stores, get_typestore
-    except ImportError as error:
-        raise missing_extra("a ROS bag", "rosbags") from error
     if not path.exists():
         raise CloudReadError("no such file or folder", path=path)
     if path.is_dir() and not (path / "metadata.yaml").is_file():

@@ -9,7 +9,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, cast
 
-from doorstate.errors import ConfigError, unknown_name
+from doorstate.errors import ConfigError, needs_extra, unknown_name
 
 if TYPE_CHECKING:
     from doorstate.networks.base import PointNetwork
@@ -36,12 +36,14 @@ def network_class(name: str) -> type[PointNetwork]:
 
     Raises:
         ConfigError: unknown name.
+        MissingExtraError: torch is not installed.
     """
     places = NETWORKS | MULTI_VIEW
     if name not in places:
         raise unknown_name("network", name, places)
     module, _, class_name = places[name].partition(":")
-    return cast("type[PointNetwork]", getattr(import_module(module), class_name))
+    with needs_extra(f"network {name}"):
+        return cast("type[PointNetwork]", getattr(import_module(module), class_name))
 
 
 def create_network(
@@ -60,6 +62,7 @@ def create_network(
     Raises:
         ConfigError: unknown name or option, options of pretrained weights, or weights of another network.
         WeightsError: no such packaged weights.
+        MissingExtraError: torch is not installed.
     """
     network = network_class(name)
     if pretrained:

@@ -13,6 +13,7 @@ import numpy as np
 from pydantic import Field
 from sklearn.metrics import accuracy_score, f1_score
 
+from doorstate._environment import describe_environment
 from doorstate._files import write_csv, write_text
 from doorstate._locks import owned_folder
 from doorstate._models import FrozenModel, Name
@@ -23,7 +24,6 @@ from doorstate.errors import DatasetError
 from doorstate.rules import create_rule
 from doorstate.rules.base import RuleResult
 from doorstate.training.contents import contents_of_run, keep_contents
-from doorstate.training.environment import describe_environment
 from doorstate.training.run_folder import RunFolder
 from doorstate.types import ABSTAINED, NO_DOOR, STATES
 

@@ -12,6 +12,7 @@ from typing import Any
 import lightning_fabric
 import torch
 
+from doorstate._environment import describe_environment, has_fast_bf16
 from doorstate._locks import owned_folder
 from doorstate._memory import keep_freed_memory
 from doorstate.dataset.roles import Role
@@ -27,7 +28,6 @@ from doorstate.training.checkpoint import TrainingState
 from doorstate.training.config import RunConfig
 from doorstate.training.contents import contents_of_run, keep_contents
 from doorstate.training.data import RunData
-from doorstate.training.environment import describe_environment, has_fast_bf16
 from doorstate.training.network_outputs import network_outputs
 from doorstate.training.recipes import Recipe
 from doorstate.training.run_folder import RunFolder, write_head_outputs, write_predictions

@@ -17,8 +17,8 @@ from doorstate.inference.network_predictor import NetworkPredictor
 from doorstate.inference.predictor import Predictor
 from doorstate.inference.serialization import prediction_to_dict
 from doorstate.pages.colors import STATE_COLORS
+from doorstate.pages.document import fill_page
 from doorstate.pages.encoding import encode_bytes, encode_cloud, encode_detections
-from doorstate.pages.render import render_page
 from doorstate.types import STATES, Points
 from doorstate.viewer.named_clouds import NamedCloud
 from doorstate.viewer.predicted_door import Line, predicted_door
@@ -110,10 +110,12 @@ def render_cloud_page(predictor: Predictor, entries: Sequence[Entry], *, live: b
         entries: results of `make_entry`; may be empty in a live page.
         live: receive more entries as server-sent events from the address `events`.
     """
-    return render_page(
-        "view.html.j2",
+    return fill_page(
+        "view.html",
         "doorstate.viewer",
+        ("page.css", "view.css", "clouds.js", "view.js"),
         live=live,
+        heading="Waiting for the first cloud" if live else "",
         predictor=str(predictor),
         page_data={
             "entries": list(entries),

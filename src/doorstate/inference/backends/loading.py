@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from doorstate.errors import ConfigError, MissingExtraError, WeightsError, unknown_name
+from doorstate.errors import ConfigError, WeightsError, needs_extra, unknown_name
 from doorstate.inference.backends.base import Backend
 from doorstate.inference.backends.onnx_backend import OnnxBackend
 from doorstate.networks.packaged import packaged_graph, packaged_weights
@@ -46,11 +46,7 @@ def load_backend(name_or_path: str | Path, threads: int | None = None, backend: 
 
 
 def _load_torch(path: Path) -> Backend:
-    try:
+    with needs_extra(path.name):
         from doorstate.inference.backends.torch_backend import TorchBackend
         from doorstate.networks.weights import load_weights
-    except ImportError as error:
-        raise MissingExtraError(
-            f"{path.name} needs the package {error.name}: install it, or use an exported .onnx file"
-        ) from error
     return TorchBackend(*load_weights(path))

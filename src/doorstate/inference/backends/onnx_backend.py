@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from doorstate.clouds.normalization import centroids
-from doorstate.errors import WeightsError, missing_extra, summarize_exception
+from doorstate.errors import WeightsError, summarize_exception
 from doorstate.inference.backends.base import Outputs
 from doorstate.inference.backends.threads import default_threads
 from doorstate.networks.card import CARD_KEY, WeightsCard
@@ -41,7 +41,6 @@ class OnnxBackend:
             ones (docs/benchmarks/busy.md).
 
     Raises:
-        MissingExtraError: onnxruntime is not installed.
         WeightsError: the file is missing, damaged, or not written by `export_onnx`.
     """
 
@@ -81,10 +80,8 @@ def is_in_graph(name: str) -> bool:
 
 
 def _open_session(path: Path, threads: int, weights: Path | None, spinning: bool) -> Any:
-    try:
-        import onnxruntime
-    except ImportError as error:
-        raise missing_extra(path.name, "onnxruntime") from error
+    import onnxruntime  # takes a tenth of a second
+
     if not path.is_file():
         raise WeightsError("no such weights file", path=path)
     options = onnxruntime.SessionOptions()

@@ -7,12 +7,10 @@ import logging
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
-from importlib import import_module
 
-from doorstate.errors import missing_extra
+from doorstate.errors import check_extra
 
 OPSET = 18  # torch's exporter writes it; newer ones are converted from it
-_PACKAGES = ("onnx", "onnxscript", "onnxruntime")  # torch's exporter needs the second
 
 
 def check_export_packages() -> None:
@@ -21,11 +19,7 @@ def check_export_packages() -> None:
     Raises:
         MissingExtraError: one of them is not.
     """
-    try:
-        for package in _PACKAGES:
-            import_module(package)
-    except ImportError as error:
-        raise missing_extra("export", *_PACKAGES) from error
+    check_extra("export", "onnx", "torch", "safetensors", "onnx", "onnxscript")
 
 
 @contextmanager
