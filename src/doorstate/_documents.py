@@ -37,8 +37,7 @@ def read_json(
     value = _located(lambda: parse_json(read_input_text(path, max_bytes, error), error), path)
     if not isinstance(value, dict):
         raise error("holds no JSON object", path=path)
-    content: dict[str, Any] = value
-    return content
+    return value
 
 
 def parse_json(text: str, error: type[DoorstateError] = RunError) -> Any:
@@ -52,7 +51,10 @@ def parse_json(text: str, error: type[DoorstateError] = RunError) -> Any:
 
 def read_toml(path: Path, error: type[DoorstateError] = ConfigError) -> dict[str, Any]:
     """Return the content of a TOML file; arguments and errors are those of `read_json`."""
-    return _located(lambda: parse_toml(read_input_text(path, MAX_SETTINGS_BYTES, error), error), path)
+    content: dict[str, Any] = _located(
+        lambda: parse_toml(read_input_text(path, MAX_SETTINGS_BYTES, error), error), path
+    )
+    return content
 
 
 def parse_toml(text: str, error: type[DoorstateError] = ConfigError) -> dict[str, Any]:

@@ -51,10 +51,7 @@ def weights_graph(weights: Path) -> ModelProto:
         raise ExportError(f"{card.network} cannot be exported: {summarize_exception(error)}") from error
     _read_from(model, weights)
     _remove_traces(model)
-    model.producer_name, model.producer_version = (
-        "doorstate",
-        "",
-    )  # else a new version would change every graph
+    model.producer_name, model.producer_version = "doorstate", ""  # a new version does not change the graph
     return model
 
 
