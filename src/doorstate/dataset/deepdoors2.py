@@ -23,13 +23,15 @@ from pathlib import Path
 
 import numpy as np
 
+from doorstate._input import read_input
 from doorstate.dataset.class_folders import file_row, nearest_label, state_of_folder
-from doorstate.errors import CloudReadError, DatasetError, DoorstateError
+from doorstate.errors import DatasetError, DoorstateError
 from doorstate.io.camera import Intrinsics, Pinhole
 from doorstate.io.depth import depth_to_points
 from doorstate.io.find import find_clouds
 from doorstate.io.options import ReadOptions
 from doorstate.io.png import parse_coarse_png
+from doorstate.io.size_limits import MAX_FILE_BYTES
 from doorstate.types import Points
 
 CAMERA = Intrinsics(640, 480, 384.681, 384.681, 319.226, 242.138)
@@ -87,12 +89,10 @@ def read_deepdoors2(path: Path, options: ReadOptions) -> Points:
     if isinstance(camera, Pinhole):
         camera = Intrinsics(CAMERA.width, CAMERA.height, *camera)
     try:
-        stored = parse_coarse_png(path.read_bytes())
+        stored = parse_coarse_png(read_input(path, MAX_FILE_BYTES))
         if stored.shape == (camera.height, camera.width):
             stored = np.rot90(stored, -1)
         depth_m = np.where(np.isin(stored, _NOT_MEASURED), np.nan, stored * STEP_M)
         return depth_to_points(depth_m, camera.turned_clockwise())
-    except OSError as error:
-        raise CloudReadError(f"cannot be read ({error.strerror or error})", path=path) from error
     except DoorstateError as error:
         raise error.located(path) from error

@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from doorstate._input import open_input
 from doorstate._paths import resolve_inside
 from doorstate.dataset.labelled import LabelledFrame
+from doorstate.io.size_limits import MAX_FILE_BYTES, check_point_count
 from doorstate.pages.encoding import picture_uri
 from doorstate.types import Points
 
@@ -23,9 +25,11 @@ def frame_pictures(frame: LabelledFrame, cloud: Points) -> dict[str, str]:
     """Return data URIs by name: `colour` if the index names an image, `depth` of an organized cloud."""
     pictures = {}
     colour = frame.columns.get("rgb", "")
-    if colour and resolve_inside(frame.folder, colour).is_file():
-        # The page does not depend on the picture, which may be damaged.
-        with suppress(OSError), Image.open(frame.folder / colour) as image:
+    if colour:
+        # The page does not depend on the picture, which may be damaged; Pillow raises exceptions of any type.
+        path = resolve_inside(frame.folder, colour)
+        with suppress(Exception), open_input(path, MAX_FILE_BYTES) as stream, Image.open(stream) as image:
+            check_point_count(image.width * image.height)
             pictures["colour"] = picture_uri(np.asarray(image.convert("RGB")))
     if cloud.ndim == 3:
         pictures["depth"] = picture_uri(_depth_picture(cloud))
