@@ -27,8 +27,9 @@ def main(recording: Path, table: Path) -> None:
         rows = csv.writer(stream)
         rows.writerow(["stamp_s", "state", "probability"])
         topic = bag.choose()  # by name, if there are several
-        # The frame is that of PointCloud2 topics; depth images are always optical.
-        for stamp_s, _, cloud in bag.clouds(topic, ReadOptions(axes="optical")):
+        # The axes are those of PointCloud2 topics; depth images are always optical.
+        for message in bag.clouds(topic, ReadOptions(axes="optical")):
+            stamp_s, cloud = message.stamp_s, message.cloud
             if isinstance(cloud, DoorstateError):  # a damaged message
                 print(f"{stamp_s:.3f}: {cloud}", file=sys.stderr)
                 continue

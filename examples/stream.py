@@ -22,9 +22,9 @@ from doorstate.types import Points
 def stamped_clouds(recording: Path) -> Iterator[tuple[float, Points]]:
     """Yield stamps in seconds and clouds; replace this by your camera."""
     with open_bag(recording) as bag:
-        for stamp_s, _, cloud in bag.clouds(bag.choose()):
-            if not isinstance(cloud, DoorstateError):
-                yield stamp_s, cloud
+        for message in bag.clouds(bag.choose()):
+            if not isinstance(message.cloud, DoorstateError):
+                yield message.stamp_s, message.cloud
 
 
 def main(recording: Path) -> int:

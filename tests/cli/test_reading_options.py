@@ -4,7 +4,9 @@
 from __future__ import annotations
 
 import inspect
+from typing import Any
 
+import numpy as np
 import pytest
 import typer
 from typer.testing import CliRunner
@@ -33,6 +35,22 @@ def test_command_gets_one_value() -> None:
     assert CliRunner().invoke(app, arguments).exit_code == 0
     camera = Pinhole(500.0, 501.0, 320.0, 240.0)
     assert calls == [("a", 3, ReadOptions(axes="optical", intrinsics=camera, units_m=0.001))]
+
+
+def test_a_quaternion_and_a_pitch_are_the_same_pose() -> None:
+    # The rotation that tf2_echo prints for an optical frame that looks 30 degrees down.
+    turned = read_options(axes="optical", quaternion="-0.612 0.612 -0.354 0.354")
+    tilted = read_options(axes="optical", pitch=30.0)
+    np.testing.assert_allclose(turned.pose().rotation, tilted.pose().rotation, atol=2e-3)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [{"quaternion": "1 2 3"}, {"quaternion": "0 0 0 1", "roll": 90.0}, {"axes": "lfu"}, {"pitch": 91.0}],
+)
+def test_impossible_poses_are_errors_of_usage(arguments: dict[str, Any]) -> None:
+    with pytest.raises(ConfigError):
+        read_options(**arguments)
 
 
 @pytest.mark.parametrize("command", [evaluate, predict, prepare, view])

@@ -23,6 +23,7 @@ import doorstate
 from doorstate.inference.predictor import Predictor
 from doorstate.io.formats import CLOUD_SUFFIXES
 from doorstate.io.pcd import write_pcd
+from doorstate.io.sensor_pose import camera_pose
 from doorstate.serving.errors import STATUS_DESCRIPTIONS
 from doorstate.serving.models import PredictionResponse
 from doorstate.serving.request import PredictQuery
@@ -108,6 +109,10 @@ def test_frame_roll_units_and_camera_transform_the_cloud(client: httpx.Client) -
     assert optical == pytest.approx(expected, abs=1e-3)
     turned = probabilities(npy_bytes(np.stack([forward, up, -left], axis=1)), format="npy", roll=90)
     assert turned == pytest.approx(expected, abs=1e-5)
+    down = npy_bytes(camera_pose("ros", pitch_deg=-20).to_body(CLOUD))
+    tilted = [{"pitch": 20}, {"quaternion": "0,0.17364818,0,0.98480775"}]
+    for query in tilted:
+        assert probabilities(down, format="npy", **query) == pytest.approx(expected, abs=1e-3)
     depth = np.random.default_rng(0).integers(1000, 3000, (30, 40), dtype=np.uint16)
     png = io.BytesIO()
     Image.fromarray(depth).save(png, "PNG")
