@@ -8,12 +8,14 @@ from pathlib import Path
 
 import pytest
 import torch
+from pydantic import ValidationError
 from safetensors.torch import save_file
 
 from doorstate.errors import WeightsError
 from doorstate.networks import create_network, list_networks
-from doorstate.networks.card import WeightsCard
+from doorstate.networks.card import CARD_KEY, WeightsCard
 from doorstate.networks.card_file import read_card
+from doorstate.networks.tensor_file import read_tensors
 from doorstate.networks.weights import load_weights, save_weights
 
 
@@ -82,3 +84,31 @@ def test_weights_of_another_network_scale_or_states_are_refused(card: WeightsCar
     with pytest.raises(WeightsError) as caught:
         load_weights(path)
     assert caught.value.path == path
+
+
+@pytest.mark.parametrize("number", [float("nan"), float("inf")])
+def test_one_number_that_is_not_finite_is_refused(number: float, tmp_path: Path) -> None:
+    network, path = create_network("pointnet"), tmp_path / "w.safetensors"
+    name, tensor = next((name, tensor) for name, tensor in network.state_dict().items() if tensor.dim() == 2)
+    with torch.no_grad():
+        tensor[0, 0] = number
+    save_weights(path, network, WeightsCard(network="pointnet", num_points=128))
+    for read in (load_weights, read_tensors):
+        with pytest.raises(WeightsError) as caught:
+            read(path)  # type: ignore[operator]
+        assert (caught.value.path, caught.value.field) == (path, name)
+
+
+def test_weights_of_another_type_are_refused(tmp_path: Path) -> None:
+    network, path = create_network("pointnet"), tmp_path / "w.safetensors"
+    card = WeightsCard(network="pointnet", num_points=128)
+    tensors = {name: tensor.to(torch.int64) for name, tensor in network.state_dict().items()}
+    save_file(tensors, path, metadata={CARD_KEY: card.model_dump_json()})
+    with pytest.raises(WeightsError, match="int64"):
+        load_weights(path)
+
+
+@pytest.mark.parametrize("temperature", [0.0, 1e-300, 1e300, float("inf"), float("nan")])
+def test_impossible_temperatures_are_refused(temperature: float) -> None:
+    with pytest.raises(ValidationError):
+        WeightsCard(network="pointnet", num_points=128, temperature=temperature)

@@ -24,12 +24,14 @@ def decode(outputs: CloudOutputs, abstain_below: float, num_points: int, millise
     """
     heads = outputs.heads
     abstention = abstention_of(outputs, abstain_below)
+    if abstention is not None and abstention.code == "invalid_outputs":
+        return Prediction.abstain(abstention, num_points, milliseconds)
     prediction = Prediction(
         state=None if abstention else DoorState.from_index(int(outputs.probabilities.argmax())),
         num_points=num_points,
         milliseconds=milliseconds,
         abstention=abstention,
-        raw_probabilities={state: float(p) for state, p in zip(STATES, outputs.probabilities, strict=True)},
+        raw_probabilities=dict(zip(STATES, outputs.probabilities.tolist(), strict=True)),
         door_probability=heads.get("p_door"),
     )
     return prediction if abstention else replace(prediction, **_geometry(heads))

@@ -8,8 +8,9 @@ from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
 from doorstate.inference.abstention import Abstention
+from doorstate.inference.validity import are_probabilities
 from doorstate.rules.base import Detection
-from doorstate.types import ABSTAINED, DoorState
+from doorstate.types import ABSTAINED, STATES, DoorState
 
 
 class DoorFrame(NamedTuple):
@@ -62,6 +63,14 @@ class Prediction:
     def probability(self) -> float | None:
         """Probability of the state; None where there are no `probabilities`."""
         return None if self.state is None or self.probabilities is None else self.probabilities[self.state]
+
+    @property
+    def is_evidence(self) -> bool:
+        """True with a state whose probabilities, if any, are valid: programs may make predictions of their own."""
+        if self.state is None:
+            return False
+        given = self.raw_probabilities
+        return given is None or (given.keys() == set(STATES) and are_probabilities(list(given.values())))
 
     @property
     def reason(self) -> str:

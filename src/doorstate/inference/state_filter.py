@@ -85,7 +85,7 @@ class StateFilter:
         """Add one frame.
 
         Args:
-            prediction: prediction for the frame; without a state it is no evidence.
+            prediction: prediction for the frame; without a state, or with invalid probabilities, it is no evidence.
             stamp_s: time of the frame, on any clock.
 
         Raises:
@@ -100,7 +100,7 @@ class StateFilter:
         self._stamp_s = stamp_s
         kept = math.exp(-self._decay_per_s * elapsed_s)
         belief = kept * self._belief + (1 - kept) / len(STATES)
-        if prediction.state is not None:
+        if prediction.is_evidence:
             belief = belief * self._likelihood(prediction, elapsed_s)
         self._belief = belief / belief.sum()
         state = self._next_state()

@@ -32,7 +32,7 @@ class HoldTimer:
         Returns:
             Seconds for which the filter's state has held, or None if this frame has another state or none.
         """
-        if prediction.state is None:
+        if not prediction.is_evidence:
             return None
         if not 0 <= stamp_s - self._last_s <= self._max_gap_s:
             self._start_s = stamp_s

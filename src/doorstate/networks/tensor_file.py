@@ -71,16 +71,20 @@ def read_tensors(path: Path) -> dict[str, NDArray[np.generic]]:
     """Read all tensors of a safetensors file.
 
     Raises:
-        WeightsError: as `read_header`.
+        WeightsError: as `read_header`, or a number is not finite.
     """
     with open_input(path, MAX_BYTES, WeightsError) as stream:
         header = _read_header(stream, path)
         stream.seek(0)
         content = stream.read()
-    return {
+    tensors = {
         name: np.frombuffer(content, place.dtype, math.prod(place.shape), place.offset).reshape(place.shape)
         for name, place in header.tensors.items()
     }
+    for name, tensor in tensors.items():
+        if not np.isfinite(tensor).all():
+            raise WeightsError("holds numbers that are not finite: damaged", path=path, field=name)
+    return tensors
 
 
 def _read_header(stream: BinaryIO, path: Path) -> TensorHeader:

@@ -17,6 +17,8 @@ from doorstate.networks.card import CARD_KEY, WeightsCard
 from doorstate.networks.card_file import check_card, read_card
 from doorstate.networks.head_layers import add_heads
 
+_FLOATS = (torch.float16, torch.float32, torch.float64)
+
 
 def save_weights(path: Path, network: PointNetwork, card: WeightsCard, half: bool = False) -> None:
     """Write parameters and running statistics, as float16 if `half`, in one step."""
@@ -49,9 +51,21 @@ def load_weights(path: Path) -> tuple[PointNetwork, WeightsCard]:
 
 
 def load_into(network: PointNetwork, path: Path) -> None:
-    """Copy the tensors of a weights file into a network, float16 as float32."""
+    """Copy the tensors of a weights file into a network, float16 as float32.
+
+    Raises:
+        WeightsError: a tensor has another type than in the network, or is not finite.
+        RuntimeError: a tensor is missing, unknown, or of another shape.
+    """
     with safe_open(path, framework="pt") as weights:
         tensors = {name: weights.get_tensor(name) for name in weights.keys()}  # noqa: SIM118 - not a dict
+    own = network.state_dict()
+    for name, tensor in tensors.items():
+        is_float = name in own and own[name].is_floating_point()
+        if is_float and tensor.dtype not in _FLOATS:
+            raise WeightsError(f"holds {tensor.dtype}", path=path, field=name, expected="float16 or float32")
+        if not torch.isfinite(tensor).all():
+            raise WeightsError("holds numbers that are not finite: damaged", path=path, field=name)
     network.load_state_dict(
         {
             name: tensor.to(torch.float32) if tensor.is_floating_point() else tensor

@@ -10,15 +10,13 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from doorstate.inference.validity import are_probabilities, is_probability
 from doorstate.networks.card import WeightsCard
 from doorstate.networks.heads.spec import Columns
 from doorstate.types import Points
 
 if TYPE_CHECKING:
     from doorstate.networks.base import PointNetwork
-
-
-SUM_TOLERANCE = 1e-3  # of probabilities in float16 or float32, from 1
 
 
 class CloudOutputs(NamedTuple):
@@ -29,13 +27,9 @@ class CloudOutputs(NamedTuple):
 
     def are_valid(self) -> bool:
         """Return True for finite numbers, among them probabilities of which those of the states sum to one."""
-        p = self.probabilities.astype(np.float64)
-        others = [value for name, value in self.heads.items() if name.startswith("p_")]
-        return (
-            bool(np.isfinite(p).all())
-            and abs(p.sum() - 1) <= SUM_TOLERANCE
-            and all(-SUM_TOLERANCE <= value <= 1 + SUM_TOLERANCE for value in (*p, *others))
-            and all(map(math.isfinite, self.heads.values()))
+        return are_probabilities(self.probabilities.tolist()) and all(
+            is_probability(value) if name.startswith("p_") else math.isfinite(value)
+            for name, value in self.heads.items()
         )
 
 

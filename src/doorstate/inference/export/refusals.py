@@ -14,8 +14,8 @@ import torch
 from torch import Tensor, nn
 
 from doorstate.inference.abstention import AbstentionCode
-from doorstate.inference.backends.base import SUM_TOLERANCE
 from doorstate.inference.gate import Gate
+from doorstate.inference.validity import SUM_TOLERANCE
 from doorstate.networks.card import WeightsCard
 from doorstate.types import DECISION_THRESHOLD, DOOR
 
