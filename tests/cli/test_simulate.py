@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import xml.etree.ElementTree as ET
 from pathlib import Path
@@ -62,3 +63,21 @@ def test_join_appends_data_sets(run: Run, simulated_folder: Path, tmp_path: Path
     code, _, err = run("join", tmp_path / "closed-128", tmp_path / "open-128", "--out", tmp_path / "joined")
     assert (code, err) == (0, "")
     assert [row["state"] for row in open_dataset(tmp_path / "joined").rows] == ["closed"] * 12 + ["open"] * 12
+
+
+def test_all_files_have_the_modes_of_the_user(run: Run, simulated_folder: Path, tmp_path: Path) -> None:
+    out = tmp_path / "clouds"
+    before = os.umask(0o027)
+    try:
+        assert (
+            run("simulate", "--out", tmp_path / "s", "--poses", 1, "--keep", "depth", "--workers", 1)[0] == 0
+        )
+        command = ("prepare", simulated_folder, "--out", out, "--points", 128, "--workers", 1)
+        assert run(*command)[0] == 0
+        cloud = sorted((simulated_folder / "pcd" / "open").glob("*.pcd"))[0]
+        assert run("predict", cloud, "--rule", "plane_state", "--out", out / "states.csv")[0] == 0
+    finally:
+        os.umask(before)
+    files = [path for folder in (out, tmp_path / "s") for path in folder.rglob("*")]
+    modes = {path.name: oct(path.stat().st_mode & 0o777) for path in files if path.is_file()}
+    assert {name: mode for name, mode in modes.items() if mode != "0o640"} == {}

@@ -82,6 +82,7 @@ def evaluate(
     from doorstate._files import check_writable
     from doorstate.cli.console import print_json, stderr
     from doorstate.cli.evaluate_output import PAGE, print_scores, write_frame_report
+    from doorstate.cli.prediction_summary import print_errors
     from doorstate.cli.predictors import Methods, load_predictors
     from doorstate.cli.progress import progress_bar
     from doorstate.dataset.labelled import check_column, labelled_frames
@@ -103,8 +104,7 @@ def evaluate(
     )
     with progress_bar("Predicting") as progress:
         results = evaluate_frames(predictors, frames, progress)
-    for unreadable, reason in results.unreadable:
-        stderr.print(f"{unreadable.file}: {reason}", style="red")
+    print_errors([(frame.file, reason) for frame, reason in results.unreadable], "file")
     if not results.frames:
         raise CloudReadError(f"none of {len(frames)} files could be read", path=folder)
     scores = results.score(group, by or ())

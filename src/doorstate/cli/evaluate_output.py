@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from doorstate import __version__
 from doorstate._files import write_text
-from doorstate.cli.console import print_table, stdout
+from doorstate.cli.console import csv_name, print_table, stdout
 from doorstate.cli.progress import progress_bar
 from doorstate.evaluation.tables import save_tables
 from doorstate.viewer.frame_page import choose_frames, make_cards, render_frame_page
@@ -57,6 +57,7 @@ def write_frame_report(
     """
     name = folder.resolve().name
     table = results.joined.drop(columns="correct").rename(columns={"sample_id": "file"})
+    table["file"] = table["file"].map(csv_name)
     write_text(out / "predictions.csv", table.to_csv(index=False, lineterminator="\n", float_format="%.5g"))
     metrics = {
         "doorstate": __version__,

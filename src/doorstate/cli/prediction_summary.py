@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from collections.abc import Sequence
 from statistics import median
 from typing import Any
 
@@ -27,20 +28,19 @@ class PredictionSummary:
         self.clouds = 0
         self._states: dict[str, Counter[str | None]] = {}
         self._milliseconds: dict[str, list[float]] = {}
-        self._errors: dict[str, list[tuple[str, str]]] = {}
+        self._errors: list[tuple[str, str]] = []
 
     @property
     def failures(self) -> int:
         """Number of clouds without a prediction."""
-        return sum(map(len, self._errors.values()))
+        return len(self._errors)
 
     def add(self, name: str, rows: list[dict[str, Any]]) -> None:
         """Count the predictions of all methods for one cloud, or its error."""
         self.clouds += 1
         error = next((row["error"] for row in rows if "error" in row), None)
         if error is not None:
-            alike = re.sub(r"\d+", "0", error)  # the same problem with other numbers
-            self._errors.setdefault(alike, []).append((name, error))
+            self._errors.append((name, error))
             return
         for row in rows:
             self._states.setdefault(row["method"], Counter())[row["state"]] += 1
@@ -48,14 +48,7 @@ class PredictionSummary:
 
     def print_errors(self) -> None:
         """Print one line for each kind of error on standard error."""
-        for cases in self._errors.values():
-            name, error = cases[0]
-            line = (
-                f"{name}: {error}"
-                if len(cases) == 1
-                else f"{self._count(len(cases))}: {error}; first: {name}"
-            )
-            stderr.print(line, style="red")
+        print_errors(self._errors, self._noun)
 
     def print_failures(self) -> None:
         """Print the number of failures on standard error, if there are any."""
@@ -79,4 +72,26 @@ class PredictionSummary:
             )
 
     def _count(self, number: int) -> str:
-        return f"{number} {self._noun}{'' if number == 1 else 's'}"
+        return count(number, self._noun)
+
+
+def print_errors(errors: Sequence[tuple[str, str]], noun: str) -> None:
+    """Print one line for each kind of error on standard error.
+
+    Args:
+        errors: name and error of each thing that failed.
+        noun: what they are, such as "file".
+    """
+    kinds: dict[str, list[tuple[str, str]]] = {}
+    for name, error in errors:
+        kinds.setdefault(re.sub(r"\d+", "0", error), []).append((name, error))  # alike but for numbers
+    for cases in kinds.values():
+        name, error = cases[0]
+        single = len(cases) == 1
+        line = f"{name}: {error}" if single else f"{count(len(cases), noun)}: {error}; first: {name}"
+        stderr.print(line, style="red")
+
+
+def count(number: int, noun: str) -> str:
+    """Return a number with its noun, such as `3 files`."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"

@@ -14,6 +14,7 @@ import typer
 
 from doorstate.cli.console import stderr
 from doorstate.cli.flags import format_flag
+from doorstate.cli.prediction_summary import print_errors
 from doorstate.cli.progress import progress_bar
 
 if TYPE_CHECKING:
@@ -43,16 +44,16 @@ def show_page(
     from doorstate.viewer.cloud_page import make_entry, render_cloud_page
 
     entries = []
-    failures = 0
+    errors: list[tuple[str, str]] = []
     with progress_bar("Predicting") as progress:
         for cloud in clouds:
             entry = make_entry(predictor, cloud, format_flag)
             if "error" in entry:
-                failures += 1
-                stderr.print(f"{entry['name']}: {entry['error']}", style="red")
+                errors.append((entry["name"], entry["error"]))
             entries.append(entry)
             progress(len(entries), total)
-    if failures < len(entries):
+    print_errors(errors, "cloud")
+    if len(errors) < len(entries):
         page = render_cloud_page(predictor, entries)
         path = out or Path(tempfile.mkdtemp(prefix="doorstate-")) / "view.html"
         write_text(path, page)
@@ -63,8 +64,8 @@ def show_page(
             )
         if out is None and open_browser:
             _open_in_browser(path.absolute().as_uri())
-    if failures:
-        stderr.print(f"{failures} of {len(entries)} clouds could not be shown")
+    if errors:
+        stderr.print(f"{len(errors)} of {len(entries)} clouds could not be shown")
         raise typer.Exit(1)
 
 
