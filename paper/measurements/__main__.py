@@ -33,6 +33,22 @@ def gate(
 
 
 @app.command()
+def ghosts(out: Out = Path("docs/benchmarks"), network: Network = "pointnet2", count: Count = 72) -> None:
+    """Count doors that ghost points turn into another state, with and without removal of outliers, for all methods."""
+    from doorstate.cli.progress import progress_bar
+
+    from .ghosts import measure_ghosts, method_table, size_table
+    from .outliers import measure_cost, measure_parts, parts_table
+
+    with progress_bar("ghosts") as progress:
+        results = measure_ghosts(network, count, progress)
+    with progress_bar("parts") as progress:
+        parts = measure_parts(count, progress)
+    tables = (method_table(results), size_table(results, network), parts_table(parts), measure_cost())
+    _write(tables, out / "ghosts.md", network=network, count=count)
+
+
+@app.command()
 def thinning(out: Out = Path("docs/benchmarks"), network: Network = "pointnet2", count: Count = 300) -> None:
     """Compare predictions and times of sampling from a part of the points with those from all points."""
     from doorstate.cli.progress import progress_bar
@@ -88,15 +104,16 @@ def export(
     _write(export_table(rows), out / "onnx.md", runs=runs, fold=fold, points=points)
 
 
-def _write(table: Table, path: Path, **options: object) -> None:
-    """Write a table with the machine, versions and options it was made with."""
+def _write(tables: Table | tuple[Table, ...], path: Path, **options: object) -> None:
+    """Write tables with the machine, versions and options they were made with."""
     from doorstate._environment import describe_environment
     from doorstate._files import write_text
 
     settings = ", ".join(
         f"{name} {value}" for name, value in (describe_environment() | options).items() if value != ""
     )
-    write_text(path, f"{table.to_markdown()}\nMade with {settings}.\n")
+    text = "\n".join(table.to_markdown() for table in (tables if isinstance(tables, tuple) else (tables,)))
+    write_text(path, f"{text}\nMade with {settings}.\n")
     typer.echo(f"{path} written")
 
 

@@ -8,12 +8,13 @@ from collections.abc import Iterator
 from doorstate._jobs import Progress
 from doorstate.inference.reference_clouds import reference_rows
 from doorstate.simulation.frames import Frame, replay
-from doorstate.simulation.presets import PRESETS
+from doorstate.simulation.generate import with_sensor
+from doorstate.simulation.presets import PRESETS, PresetName, draw_rows
 from doorstate.simulation.row import Row
 from doorstate.simulation.settings import SimulationSettings
 
 _SEED = 1_000_003  # of no data set
-_SOURCES = (
+SOURCES: tuple[tuple[PresetName, str], ...] = (
     ("ogurob", "none"),
     ("varied", "none"),
     ("varied", "xtion"),
@@ -34,7 +35,7 @@ def reference_frames(count: int, progress: Progress) -> Iterator[tuple[Row, Fram
 def varied_frames(count: int, progress: Progress) -> Iterator[tuple[Row, Frame]]:
     """Yield rows and frames of doors in all states from several presets, scenes and sensors, in equal shares."""
     sources = [
-        SimulationSettings(preset=PRESETS[preset], seed=_SEED, sensor=sensor) for preset, sensor in _SOURCES
+        SimulationSettings(preset=PRESETS[preset], seed=_SEED, sensor=sensor) for preset, sensor in SOURCES
     ]
     number = 0
     for index in range(count):
@@ -45,3 +46,15 @@ def varied_frames(count: int, progress: Progress) -> Iterator[tuple[Row, Frame]]
                 progress(number, count)
                 number += 1
                 yield row, frame
+
+
+def scene_frames(
+    count: int, sensor: str, progress: Progress, preset: PresetName = "varied"
+) -> Iterator[tuple[Row, Frame]]:
+    """Yield rows and frames of doors in different rooms, in all states, as a sensor measures them."""
+    for number in range(count):
+        progress(number, count)
+        rows = draw_rows(PRESETS[preset], _SEED, number // 3)
+        row = with_sensor(rows[number % 3], sensor)
+        yield row, replay(row)
+    progress(count, count)

@@ -46,6 +46,11 @@ def glass(row: Row, frame: Frame) -> Points:
     return without(frame.points, (closed.full.part == Part.LEAF) | (frame.full.part == Part.LEAF))
 
 
+def dark_leaf(row: Row, frame: Frame) -> Points:
+    """Return the cloud without the points of the leaf, as of black and glossy leaves."""
+    return without(frame.points, frame.cut.part == Part.LEAF)
+
+
 def _band(first: float, last: float, axis: int) -> Fault:
     """Return a fault that removes a band of the image, from and to a share of its height (axis 0) or width (axis 1)."""
 
@@ -78,6 +83,7 @@ FAULTS: dict[str, Fault] = {
     "lower half missing": _band(0.5, 1.0, 0),
     "nine tenths of the columns missing": _dropout(0.9, columns=True),
     "half of the pixels missing": _dropout(0.5, columns=False),
+    "dark leaf": lambda row, frame, generator: dark_leaf(row, frame),
     "glass leaf": lambda row, frame, generator: glass(row, frame),
 }
 

@@ -20,6 +20,7 @@ AbstentionCode = Literal[
     "narrow_view",
     "hole",  # glass or missing data: no free way is visible
     "invalid_outputs",  # of the network: not finite, or no probabilities
+    "door_hole",  # a dark or glass leaf, or an open door into nothing
     "no_door",
     "unsure",
     "no_rule_result",
@@ -39,6 +40,10 @@ SENTENCES: dict[AbstentionCode, str] = {
     "narrow_view": "the view is only {view_deg:.0f} degrees wide: at least {min_view_deg:g} are needed",
     "hole": "{share:.0%} of the view ahead is a hole without a floor {free_reach_m:g} m away: glass or missing data",
     "invalid_outputs": "the network's outputs are not valid numbers: its weights or the machine are damaged",
+    "door_hole": (
+        "a hole like a doorway, {width_m:.1f} m wide and {height_m:.1f} m high, {distance_m:.1f} m away, and no floor "
+        "behind it: a dark or glass leaf, or an open door into nothing"
+    ),
     "no_door": "there seems to be no door: its probability is {probability:.2f}",
     "unsure": "unsure: {state} has probability {probability:.2f}, these weights need {min_probability:.2f}",
     "no_message": "no message for {silence_s:g} s",

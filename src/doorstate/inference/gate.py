@@ -14,7 +14,7 @@ from doorstate.clouds.measured import is_measured
 from doorstate.clouds.preparation import MIN_POINTS
 from doorstate.errors import ConfigError
 from doorstate.inference.abstention import Abstention
-from doorstate.inference.holes import hole_share
+from doorstate.inference.holes import find_holes
 from doorstate.types import Points
 
 _SHARES = (
@@ -91,7 +91,7 @@ class Gate:
 
         Args:
             cloud: (N, 3) or organized (H, W, 3) metres, x forward, y left, z up, NaN where nothing
-                was measured. Holes are searched in organized clouds, and in flat ones of 4800 points or more.
+                was measured. Holes are searched in organized clouds and in flat ones.
             outlier_share: share of its measured points that was removed before (`clouds.outliers`).
         """
         if outlier_share > self.max_outlier_share:
@@ -153,16 +153,18 @@ class Gate:
         return Abstention("narrow_view", {"view_deg": view_deg, "min_view_deg": self.min_view_deg})
 
     def _without_holes(self, view: _View) -> Abstention | None:
-        share = hole_share(
+        holes = find_holes(
             view.cloud,
             view.measured,
             min_height_share=self.hole_height_share,
             free_reach_m=self.free_reach_m,
             margin_share=self.margin_share,
         )
-        if share <= self.max_hole_share:
+        if holes.share <= self.max_hole_share:
             return None
-        return Abstention("hole", {"share": share, "free_reach_m": self.free_reach_m})
+        if holes.door is not None:
+            return Abstention("door_hole", {**holes.door._asdict(), "share": holes.share})
+        return Abstention("hole", {"share": holes.share, "free_reach_m": self.free_reach_m})
 
 
 DEFAULT_GATE = Gate()

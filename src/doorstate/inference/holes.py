@@ -3,44 +3,58 @@
 
 A hole is a run of missing pixels down a column of the image. It is a free way only if below it something was measured
 farther away than a door can be: the floor behind an open door. Behind glass, dropout and things before the lens no such
-floor is visible.
+floor is visible. A black, glossy or glass leaf leaves a hole in the shape of a doorway: as wide as a door, with a
+surface on both sides.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from doorstate.inference.view_cells import Cells, view_cells
 from doorstate.types import Points
 
-# Cells of 8 x 8 pixels in a 640 x 480 image: hundredths of a door, tens of pixels to judge by.
-_GRID_ROWS, _GRID_COLUMNS = 60, 80
-_POINTS_PER_CELL = 16  # on average; a flat cloud with fewer has gaps of its own
-# Of the cells; with fewer than 15 x 20 a gap beside a leaf and a hole in it look alike.
-_MIN_GRID_SHARE = 1 / 16
-_MIN_CELL_SHARE = 1 / 8  # of a cell's pixels; fewer are flying pixels
-# Flat clouds are evaluated within 45 degrees of straight ahead: no depth camera sees more.
-_MAX_TANGENT = 1.0
+_DOOR_WIDTH_M = (0.5, 2.6)  # of leaves, double ones as well
+_MIN_DOOR_HEIGHT_M = 0.6  # black leaves may be measured in their upper half
+_FLANK_COLUMNS = 2  # on each side; a jamb of a few centimetres may be missing
+_MIN_FLANK_SHARE = 0.3  # of the cells beside a hole
 
 
-class _Cells(NamedTuple):
-    """Coarse image of a cloud, the lowest row last."""
+class DoorHole(NamedTuple):
+    """Hole in the shape of a doorway."""
 
-    filled: NDArray[np.bool_]  # (rows, columns) something was measured
-    reach_m: NDArray[np.float64]  # (rows, columns) mean horizontal range
+    width_m: float
+    height_m: float
+    distance_m: float  # horizontal range of the surfaces beside it
 
 
-def hole_share(
+class Holes(NamedTuple):
+    """Holes without a floor behind them."""
+
+    share: float  # of the columns
+    door: DoorHole | None  # the widest in the shape of a doorway
+
+
+class _Runs(NamedTuple):
+    """Runs of missing cells, one for each column."""
+
+    length: NDArray[np.int64]  # 0: no hole
+    top: NDArray[np.int64]  # row
+
+
+def find_holes(
     cloud: Points,
     measured: NDArray[np.bool_],
     *,
     min_height_share: float,
     free_reach_m: float,
     margin_share: float,
-) -> float:
-    """Return the share of the columns with a hole and nothing far away below it; 0 for flat clouds of few points.
+) -> Holes:
+    """Return the share of the columns with a hole and nothing far away below it, and a hole like a doorway.
 
     Args:
         cloud: (N, 3) or organized (H, W, 3) metres, sensor frame.
@@ -49,70 +63,56 @@ def hole_share(
         free_reach_m: horizontal range that makes a hole a free way if it was measured below it.
         margin_share: columns ignored on each side.
     """
-    cells = _image_cells(cloud, measured) if cloud.ndim == 3 else _ray_cells(cloud[measured])
+    cells = view_cells(cloud, measured)
     if cells is None:
-        return 0.0
-    columns = cells.filled.shape[1]
-    margin = round(margin_share * columns)
-    filled, reach_m = (grid[:, margin : columns - margin] for grid in cells)
-    min_run = max(1, round(min_height_share * len(filled)))
-    missing_run = np.zeros(filled.shape[1], dtype=np.int64)  # cells in a row, from the lowest row upwards
-    reach_below_m = np.zeros(filled.shape[1])
-    has_hole = np.zeros(filled.shape[1], dtype=np.bool_)
-    for row_filled, row_reach_m in zip(filled[::-1], reach_m[::-1], strict=True):
-        missing_run = np.where(row_filled, 0, missing_run + 1)
-        reach_below_m = np.where(row_filled, np.maximum(reach_below_m, row_reach_m), reach_below_m)
-        has_hole |= (missing_run >= min_run) & (reach_below_m < free_reach_m)
-    return float(has_hole.mean())
+        return Holes(0.0, None)
+    min_run = max(1, round(min_height_share * len(cells.filled)))
+    runs = _runs(cells, min_run, free_reach_m)
+    is_hole = runs.length > 0
+    margin = round(margin_share * len(is_hole))
+    doors = (_door_hole(cells, runs, first, last) for first, last in _groups(is_hole))
+    found = [door for door in doors if door is not None]
+    share = float(is_hole[margin : len(is_hole) - margin].mean())
+    return Holes(share, max(found, key=lambda door: door.width_m, default=None))
 
 
-def _image_cells(cloud: Points, measured: NDArray[np.bool_]) -> _Cells:
-    """Return the cells of an image (H, W, 3), turned upright."""
-    size = max(1, min(measured.shape) // _GRID_ROWS)
-    rows, columns = measured.shape[0] // size * size, measured.shape[1] // size * size
-
-    def total(values: NDArray[np.float32]) -> NDArray[np.float64]:
-        parts = [values[i:rows:size, j:columns:size] for i in range(size) for j in range(size)]
-        sums: NDArray[np.float64] = np.sum(parts, axis=0, dtype=np.float64)
-        return sums
-
-    x, y, z = (np.where(measured, cloud[..., axis], np.float32(0)) for axis in range(3))
-    count = total(measured.astype(np.float32))
-    filled = count >= max(1.0, _MIN_CELL_SHARE * size**2)
-    divisor = np.maximum(count, 1)
-    reach_m = total(np.sqrt(x * x + y * y)) / divisor
-    steepness = total(z) / divisor / np.maximum(reach_m, 1e-3)
-    turns = _quarter_turns(filled, steepness)
-    return _Cells(np.rot90(filled, turns), np.rot90(reach_m, turns))
+def _runs(cells: Cells, min_run: int, free_reach_m: float) -> _Runs:
+    """Return the longest run of each column, of at least `min_run` cells and without a floor below it."""
+    rows, columns = cells.filled.shape
+    current, length, top = (np.zeros(columns, dtype=np.int64) for _ in range(3))
+    reach_below_m = np.zeros(columns)
+    for row in range(rows - 1, -1, -1):
+        filled = cells.filled[row]
+        current = np.where(filled, 0, current + 1)
+        reach_below_m = np.where(filled, np.maximum(reach_below_m, cells.reach_m[row]), reach_below_m)
+        longer = (current >= np.maximum(min_run, length + 1)) & (reach_below_m < free_reach_m)
+        length = np.where(longer, current, length)
+        top = np.where(longer, row, top)
+    return _Runs(length, top)
 
 
-def _quarter_turns(filled: NDArray[np.bool_], steepness: NDArray[np.float64]) -> int:
-    """Return the counter-clockwise quarter turns that put an image upright: its steepest rays belong to the top."""
-    row, column = np.nonzero(filled)
-    if len(row) < 2:
-        return 0
-    steep = steepness[filled] - steepness[filled].mean()
-    down = float((steep * (row - row.mean())).sum()) / max(1.0, float(row.var()))
-    right = float((steep * (column - column.mean())).sum()) / max(1.0, float(column.var()))
-    # The top of the scene is up, right, down or left in the image.
-    return int(np.argmax((-down, right, down, -right)))
+def _groups(mask: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
+    """Yield first and one past the last column of each group of columns in a row."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
+    yield from zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
 
 
-def _ray_cells(points: Points) -> _Cells | None:
-    """Return cells between the outermost rays ahead of points (N, 3) without an image; None if they are too few."""
-    share = min(1.0, len(points) / (_POINTS_PER_CELL * _GRID_ROWS * _GRID_COLUMNS))
-    if share < _MIN_GRID_SHARE:
+def _door_hole(cells: Cells, runs: _Runs, first: int, last: int) -> DoorHole | None:
+    """Return a group of columns as a hole like a doorway, or None if it is none."""
+    top = int(np.median(runs.top[first:last]))
+    bottom = int(np.median((runs.top + runs.length)[first:last]))
+    flanks = []
+    for columns in (np.s_[max(0, first - _FLANK_COLUMNS) : first], np.s_[last : last + _FLANK_COLUMNS]):
+        filled = cells.filled[top:bottom, columns]
+        if filled.size == 0 or filled.mean() < _MIN_FLANK_SHARE:
+            return None
+        flanks.append(cells.points_m[top:bottom, columns][filled])
+    left, right = (np.median(flank, axis=0) for flank in flanks)
+    distances_m = [float(np.hypot(*flank[:2])) for flank in (left, right)]
+    count = last - first
+    width_m = float(np.hypot(*(left - right)[:2])) * count / (count + _FLANK_COLUMNS)
+    height_m = float(np.ptp(np.concatenate(flanks)[:, 2]))
+    low_m, high_m = _DOOR_WIDTH_M
+    if not (low_m <= width_m <= high_m and height_m >= _MIN_DOOR_HEIGHT_M):
         return None
-    rows, columns = round(_GRID_ROWS * share**0.5), round(_GRID_COLUMNS * share**0.5)
-    ahead = points[points[:, 0] > 0].astype(np.float64)
-    tangents = -ahead[:, 1:] / ahead[:, :1]  # (N, 2) right, down
-    near = (np.abs(tangents) <= _MAX_TANGENT).all(axis=1)
-    ahead, tangents = ahead[near], tangents[near]
-    low, high = np.quantile(tangents, (0.005, 0.995), axis=0) if len(ahead) else (np.zeros(2), np.ones(2))
-    shape = np.array((columns, rows))
-    cell = np.clip((tangents - low) / np.maximum(high - low, 1e-6) * shape, 0, shape - 1).astype(np.int64)
-    number = cell[:, 1] * columns + cell[:, 0]
-    count = np.bincount(number, minlength=rows * columns)
-    reach_m = np.bincount(number, np.hypot(ahead[:, 0], ahead[:, 1]), rows * columns)
-    grid = (rows, columns)
-    return _Cells((count > 0).reshape(grid), (reach_m / np.maximum(count, 1)).reshape(grid))
+    return DoorHole(width_m, height_m, float(np.mean(distances_m)))
