@@ -57,26 +57,28 @@ def with_ghosts(frame: Frame, ghosts: Ghosts, rng: np.random.Generator) -> Point
     return frame.points * (add_ghosts(depth_m, ghosts, rng) / depth_m)[..., None]
 
 
-def measure_ghosts(network: str, count: int, progress: Progress) -> list[GhostResult]:
+def measure_ghosts(
+    network: str, count: int, progress: Progress, conditions: Sequence[Ghosts] | None = None
+) -> list[GhostResult]:
     """Return the predictions of packaged weights and of every rule for simulated doors with every kind of ghosts.
 
     Half of the doors are without noise, and half are seen by a sensor with noise.
     """
     backend = NetworkPredictor.from_weights(network).backend
-    methods: list[tuple[str, Predictor, Predictor]] = [
-        (network, *(NetworkPredictor(backend, remove_outliers=removed) for removed in (True, False)))
-    ]
+    methods: dict[str, dict[bool, Predictor]] = {
+        network: {removed: NetworkPredictor(backend, remove_outliers=removed) for removed in (True, False)}
+    }
     for name in list_rules():
         rule = create_rule(name)
-        methods.append((name, *(RulePredictor(rule, remove_outliers=removed) for removed in (True, False))))
+        methods[name] = {removed: RulePredictor(rule, remove_outliers=removed) for removed in (True, False)}
     results = []
     for number, (row, frame) in enumerate(_frames(count, progress)):
-        for condition, ghosts in enumerate(ghost_conditions()):
+        for condition, ghosts in enumerate(conditions or ghost_conditions()):
             cloud = with_ghosts(frame, ghosts, np.random.default_rng((number, condition)))
-            for name, cleaning, plain in methods:
+            for name, predictors in methods.items():
                 results += [
                     GhostResult(name, removed, ghosts, row.sample_id, row.state, predictor(cloud).label)
-                    for removed, predictor in ((True, cleaning), (False, plain))
+                    for removed, predictor in predictors.items()
                 ]
     return results
 
@@ -93,10 +95,10 @@ def _frames(count: int, progress: Progress) -> Iterator[tuple[Row, Frame]]:
 
 def method_table(results: Sequence[GhostResult]) -> Table:
     """Return one row per method and share of ghosts, sizes and sides together."""
-    rows = []
+    rows: list[tuple[str, ...]] = []
     frame = _frame(results)
     for (method, share), group in frame.groupby(["method", "share"], sort=False):
-        cells = [method, f"{share:.1%}"]
+        cells = [str(method), f"{share:.1%}"]
         for removed in (False, True):
             cells += _counts(group[group["removed"] == removed])
         rows.append(tuple(cells))
@@ -132,14 +134,14 @@ def size_table(results: Sequence[GhostResult], method: str) -> Table:
     """Return one row per share, size and side of the ghosts: closed doors of one method."""
     frame = _frame(results)
     frame = frame[(frame["method"] == method) & (frame["state"] == "closed") & (frame["share"] > 0)]
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for (share, side_px, towards), group in frame.groupby(["share", "side_px", "towards"], sort=False):
         kept, removed = (group.loc[group["removed"] == value, "predicted"] for value in (False, True))
         rows.append(
             (
                 f"{share:.1%}",
                 f"{side_px} x {side_px}",
-                towards,
+                str(towards),
                 str(len(kept)),
                 *(str((kept == state).sum()) for state in (*STATES, ABSTAINED)),
                 *(str((removed == state).sum()) for state in (*STATES, ABSTAINED)),

@@ -6,6 +6,7 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -32,7 +33,7 @@ class PartCounts(NamedTuple):
 
 def measure_parts(count: int, progress: Progress) -> dict[tuple[str, str], PartCounts]:
     """Return the counts of `count` frames of each preset and sensor."""
-    counts = {}
+    counts: dict[tuple[str, str], PartCounts] = {}
     for number, (preset, sensor) in enumerate(SOURCES):
 
         def report(done: int, _: int, start: int = number * count) -> None:
@@ -78,7 +79,7 @@ def measure_cost(repeats: int = 21) -> Table:
     flat = np.ascontiguousarray(image[is_measured(image)])
     rows = []
     for name, cloud in (("image", image), ("flat", flat), ("flat, every 15th point", flat[::15].copy())):
-        times_ms = _times_ms(lambda cloud=cloud: outlier_mask(cloud), repeats)
+        times_ms = _times_ms(partial(outlier_mask, cloud), repeats)
         rows.append((name, str(cloud[..., 0].size), f"{np.median(times_ms):.1f}", f"{min(times_ms):.1f}"))
     return Table(
         "Time to find outliers",

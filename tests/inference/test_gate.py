@@ -63,7 +63,7 @@ def test_a_hole_is_detected_for_every_roll_of_the_camera() -> None:
     bad = room(floor_m=3.2, opening=True)
     for quarter_turns in range(4):
         assert Gate()(np.rot90(opened, quarter_turns)) is None
-        assert code_of(np.rot90(bad, quarter_turns)) == "hole"
+        assert code_of(np.rot90(bad, quarter_turns)) == "door_hole"
 
 
 def test_small_holes_and_missing_edges_pass() -> None:
@@ -121,7 +121,7 @@ def test_scattered_dropout_of_half_the_pixels_passes() -> None:
     lost = np.random.default_rng(0).random((HEIGHT, WIDTH)) < 0.5
     assert Gate()(without(room(), lost)) is None
     assert Gate()(without(room(opening=True), lost)) is None
-    assert code_of(without(room(floor_m=3.2, opening=True), lost)) == "hole"
+    assert code_of(without(room(floor_m=3.2, opening=True), lost)) == "door_hole"
 
 
 def test_simulated_doors_pass_and_glass_doors_do_not(small_dataset: PreparedDataset) -> None:

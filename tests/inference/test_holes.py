@@ -55,7 +55,7 @@ def test_flat_clouds_of_any_size_are_searched(count: int) -> None:
 def test_missing_data_are_no_doorway() -> None:
     cloud = wall()
     edge, wide, whole_height = cloud.copy(), cloud.copy(), cloud.copy()
-    edge[:, :110] = np.nan  # nothing beside it
+    edge[:, :80] = np.nan  # nothing beside it
     wide[40:200, 20:300] = np.nan  # 3 m
     whole_height[:, 100:130] = np.nan  # 0.3 m
     for holed in (edge, wide, whole_height):

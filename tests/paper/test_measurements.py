@@ -7,6 +7,8 @@ import pytest
 from paper.measurements.export import ExportResult, export_table, measure_export
 from paper.measurements.frames import varied_frames
 from paper.measurements.gate import FAULTS, gate_table, measure_gate
+from paper.measurements.ghosts import Ghosts, measure_ghosts, method_table, size_table
+from paper.measurements.outliers import measure_cost, measure_parts, parts_table
 from paper.measurements.thinning import measure_thinning, thinning_table
 
 from doorstate._jobs import no_progress
@@ -55,3 +57,22 @@ def test_gate_only_removes_states() -> None:
     assert len(results) == 2 * len(FAULTS)
     assert all(result.gated in (None, result.ungated) for result in results)
     assert [row[0] for row in gate_table(results).rows] == list(FAULTS)
+
+
+def test_ghosts_open_no_closed_door_once_they_are_removed() -> None:
+    conditions = [Ghosts(share=0, side_px=1), Ghosts(share=0.01, side_px=2, towards="behind")]
+    results = measure_ghosts("pointnet2", 2, no_progress, conditions)
+    assert len(results) == 2 * 2 * 2 * 6
+    network = [result for result in results if result.method == "pointnet2" and result.state == "closed"]
+    assert {result.predicted for result in network if result.removed} == {"closed"}
+    rows = method_table(results).rows
+    assert {row[-3] for row in rows} == {"0"}  # become open, removed
+    assert len(size_table(results, "pointnet2").rows) == 1
+
+
+def test_clean_frames_keep_their_points() -> None:
+    counts = measure_parts(1, no_progress)
+    for sums in counts.values():
+        assert sum(sums.removed.values()) < 0.01 * sum(sums.measured.values())
+    assert len(parts_table(counts).rows) == 2 * len(counts)
+    assert len(measure_cost(1).rows) == 3

@@ -60,7 +60,7 @@ def _image_cells(cloud: Points, measured: NDArray[np.bool_]) -> Cells:
     points_m = np.stack([total(values) / divisor for values in (x, y, z)], axis=-1)
     steepness = points_m[..., 2] / np.maximum(reach_m, 1e-3)
     turns = _quarter_turns(filled, steepness)
-    return Cells(*(np.rot90(grid, turns) for grid in (filled, reach_m, points_m)))
+    return Cells(np.rot90(filled, turns), np.rot90(reach_m, turns), np.rot90(points_m, turns))
 
 
 def _quarter_turns(filled: NDArray[np.bool_], steepness: NDArray[np.float64]) -> int:
@@ -110,7 +110,7 @@ def _sparse_cells(points: NDArray[np.float64], places: NDArray[np.float64]) -> C
         places: (N, 2) place in the view, 0 to 1 to the right and down.
     """
     tree = cKDTree(places)
-    spacing = tree.query(places, [_NEIGHBOUR + 1])[0][:, 0]
+    spacing = np.asarray(tree.query(places, [_NEIGHBOUR + 1])[0])[:, 0]
     across = (np.arange(_SPARSE_COLUMNS) + 0.5) / _SPARSE_COLUMNS
     down = (np.arange(_SPARSE_ROWS) + 0.5) / _SPARSE_ROWS
     centres = np.stack(np.meshgrid(across, down), axis=-1)  # (rows, columns, 2)

@@ -20,7 +20,8 @@ _DESCRIPTION = {
     "frame": "x forward, y left, z up, origin at the camera, gravity-aligned (ROS REP 103)",
     "units": "metres",
     "preparation": (
-        "drop points that are not finite or (0, 0, 0), then keep as many as the input takes in farthest-point order; "
+        "drop points that are not finite or (0, 0, 0), remove outliers, then keep as many as the input "
+        "takes in farthest-point order; "
         f"centring and division by {SCALE_M} m are in the graph"
     ),
     "labels": ",".join(STATES),
