@@ -61,13 +61,13 @@ networks = ["pointnet"]
 heads = ["angle"]
 fine_tuning = {epochs = 2, learning_rate = 1e-3, schedule = "steps", step_epochs = 1}
 """
-_TRANSFER = b"""networks = ["pointnet"]
+_TRANSFER = f"""networks = ["pointnet"]
 num_points = 512
 [trained]
-a = "."
+a = "{_FOLDER}"
 [tested]
 b = "data"
-"""
+""".encode()
 _MAX_PIXELS = 2000
 _OPTIONS: dict[str, dict[str, Any]] = {
     "pointnet": {"batchnorm_eps": 1e-3},
