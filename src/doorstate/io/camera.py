@@ -41,10 +41,12 @@ class Intrinsics:
     distortion: Distortion | None = None
 
     def __post_init__(self) -> None:
-        if min(self.width, self.height) < 1 or self.width * self.height > MAX_POINTS:
+        if not 1 <= min(self.width, self.height) <= max(self.width, self.height) <= MAX_SIDE_PX:
+            raise CameraError("the image size is impossible", expected=f"1 to {MAX_SIDE_PX} pixels a side")
+        if self.width * self.height > MAX_POINTS:
             raise CameraError(
-                f"an image size of {self.width:.6g} x {self.height:.6g} is impossible",
-                expected=f"1 to {MAX_POINTS} pixels in all",
+                f"an image size of {self.width} x {self.height} is impossible",
+                expected=f"at most {MAX_POINTS} pixels in all",
             )
         for name in ("fx", "fy", "cx", "cy"):
             value = getattr(self, name)

@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Arrays of pieces are joined without a memory map, byte for byte as NumPy writes them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from doorstate.clouds.preparation import CloudSpec
+from doorstate.dataset.pieces import write_concatenated
+from doorstate.dataset.preparation import Preparation
+from doorstate.dataset.prepare import prepare_dataset
+from doorstate.errors import OutputError
+from tests.full_disk import full_disk
+
+
+@pytest.mark.parametrize(
+    ("shape", "dtype"), [((7, 4, 3), np.float32), ((7, 4), np.uint8), ((0, 4, 3), np.float32)]
+)
+def test_the_file_is_that_of_numpy(shape: tuple[int, ...], dtype: type[np.generic], tmp_path: Path) -> None:
+    array = np.random.default_rng(0).integers(0, 200, shape).astype(dtype)
+    write_concatenated(tmp_path / "a.npy", [array[:3], array[3:3], array[3:]], shape, dtype)
+    np.save(tmp_path / "b.npy", array)
+    assert (tmp_path / "a.npy").read_bytes() == (tmp_path / "b.npy").read_bytes()
+
+
+def test_a_full_disk_is_an_error_in_one_line(simulated_folder: Path, tmp_path: Path) -> None:
+    with pytest.raises(OutputError) as refused, full_disk(tmp_path):
+        write_concatenated(tmp_path / "a.npy", [np.zeros((3, 2), np.uint8)], (3, 2), np.uint8)
+    assert refused.value.path == tmp_path / "a.npy"
+    assert list(tmp_path.iterdir()) == []
+    with pytest.raises(OutputError), full_disk(tmp_path):
+        prepare_dataset(Preparation(simulated_folder, CloudSpec(num_points=128)), tmp_path / "out", workers=1)
