@@ -61,6 +61,7 @@ def test_failures_are_noticed(read: object, monkeypatch: pytest.MonkeyPatch) -> 
         ("comparison.json", b'{"name": "a", "dataset": "data", "networks": 5}'),
         ("rows.csv", b"sample_id,scene\na," + b"[" * 100_000),
         ("rows.csv", b"sample_id,camera,camera.width\na,b,640"),
+        ("data/manifest.csv", b"sample_id,state\na,open\na,open\nb,closed\n"),
         ("predictions.csv.gz", gzip.compress(b"fold\n" + b"9" * 30)),
         ("predictions.csv.gz", gzip.compress(b"fold\n1,2,3\n")),
         (

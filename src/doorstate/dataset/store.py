@@ -6,6 +6,7 @@ A simulated data set may be stored without clouds; single clouds are then render
 
 from __future__ import annotations
 
+from collections import Counter
 from functools import cached_property
 from pathlib import Path
 from typing import Literal, TypeVar
@@ -276,6 +277,9 @@ def _check(
     for column in ("sample_id", "state"):
         if rows and column not in rows[0]:
             raise DatasetError("column is missing", path=manifest, field=column)
+    name, count = Counter(row["sample_id"] for row in rows).most_common(1)[0] if rows else ("", 0)
+    if count > 1:
+        raise DatasetError(f"{count} samples are named {name!r}", path=manifest, field="sample_id")
     unknown = sorted({row["state"] for row in rows} - set(_LABELS))
     if unknown:
         raise DatasetError(

@@ -36,13 +36,16 @@ def manifest_frame(rows: Sequence[Mapping[str, str]]) -> pd.DataFrame:
     Columns whose names end in a unit (`_m`, `_deg`, `_px`, `_share`) are float64 with NaN for an empty field.
 
     Raises:
-        DatasetError: a column that every manifest has is missing.
+        DatasetError: a column that every manifest has is missing, or two samples have one name.
         ValueError: a field of such a column is not a number.
     """
     frame = pd.DataFrame(list(rows), dtype="str")
     for column in ("sample_id", "state"):
         if column not in frame:
             raise DatasetError("column is missing", field=column)
+    repeated = frame["sample_id"][frame["sample_id"].duplicated()]
+    if len(repeated):
+        raise DatasetError(f"several samples are named {repeated.iloc[0]!r}", field="sample_id")
     frame = frame.where((frame != "") | (frame.columns == "sample_id"))
     for column in frame.columns:
         if column.endswith(_UNITS):
