@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -13,6 +14,7 @@ from doorstate.errors import needs_extra
 
 if TYPE_CHECKING:
     from doorstate.cli.predictors import Methods
+    from doorstate.inference.predictor import Predictor
     from doorstate.serving.worker import LoadPredictor
 
 _ALL_ADDRESSES = {"0.0.0.0", "::"}
@@ -122,11 +124,20 @@ def serve(
 def _loader(methods: Methods, points: int | None, budget_ms: float | None, threads: int) -> LoadPredictor:
     """Return the function that loads the predictor in every worker; a time budget is measured here, once."""
     from doorstate.cli.predictors import load_predictor, only_method
-    from doorstate.inference.predictor import Predictor
 
     if budget_ms is not None:
         measured = load_predictor(methods, points, budget_ms=budget_ms, threads=threads)
         points = getattr(measured, "num_points", None)
     name, choice = only_method(methods)
     rule = name if choice is None else None
-    return partial(Predictor.load, choice, rule=rule, num_points=points, threads=threads)
+    return partial(_load_in_worker, choice, rule, points, threads)
+
+
+def _load_in_worker(
+    choice: Path | str | None, rule: str | None, points: int | None, threads: int
+) -> Predictor:
+    from doorstate.inference.backends.threads import configure_torch
+    from doorstate.inference.predictor import Predictor
+
+    configure_torch(threads, used=isinstance(choice, Path) and choice.suffix == ".safetensors")
+    return Predictor.load(choice, rule=rule, num_points=points, threads=threads)
