@@ -19,6 +19,9 @@ from doorstate.networks import list_networks
 
 pytest.importorskip("build")
 
+NEEDED_FOR_AN_ANSWER = {
+    *("numpy", "scipy", "onnxruntime", "pydantic", "typer", "rich", "pillow", "pypcd4", "pyyaml", "filelock")
+}
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "src" / "doorstate"
 
@@ -78,7 +81,9 @@ def test_the_metadata_are_valid_and_complete(built: Path) -> None:
     assert (metadata.license_expression, metadata.license_files) == ("Apache-2.0", ["LICENSE"])
     assert str(metadata.requires_python) == ">=3.11"
     assert "Typing :: Typed" in (metadata.classifiers or [])
-    assert {"bags", "serve", "onnx", "fast", "docs"} <= set(metadata.provides_extra or [])
+    assert {"train", "bags", "serve", "onnx", "fast", "docs"} <= set(metadata.provides_extra or [])
+    requirements = metadata.requires_dist or []
+    assert {entry.name for entry in requirements if entry.marker is None} == NEEDED_FOR_AN_ANSWER
     assert metadata.description_content_type == "text/markdown"
 
 
@@ -117,6 +122,9 @@ def test_packaged_weights_stay_small() -> None:
     }
     assert set(weights) == {"pointnet2", *(f"ogurob-{name}" for name in list_networks())}
     assert sum(weights.values()) <= 25e6
+    graphs = {path.stem: path.stat().st_size for path in (PACKAGE / "networks/pretrained").glob("*.onnx")}
+    assert set(graphs) == set(weights)
+    assert max(graphs.values()) <= 100e3, "they hold no weights"
 
 
 def test_a_clone_stays_small() -> None:

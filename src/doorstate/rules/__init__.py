@@ -1,22 +1,27 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rules that tell the state of a door without training: reconstructed related work and two plain baselines."""
+"""Rules that tell the state of a door without training: reconstructed related work and two plain baselines.
+
+Importing this package imports no rule and no SciPy: a rule's module is loaded when the rule is first needed.
+"""
 
 from __future__ import annotations
 
-from typing import Any
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, cast
 
 from doorstate.errors import unknown_name
-from doorstate.rules.angle_bins import AngleBinsRule
-from doorstate.rules.base import Rule
-from doorstate.rules.depth_region import DepthRegionRule
-from doorstate.rules.open_door import OpenDoorRule
-from doorstate.rules.plane_state import PlaneStateRule
-from doorstate.rules.wall_leaf_angle import WallLeafAngleRule
 
-RULES: dict[str, type[Rule[Any]]] = {
-    rule.name: rule
-    for rule in (OpenDoorRule, PlaneStateRule, WallLeafAngleRule, AngleBinsRule, DepthRegionRule)
+if TYPE_CHECKING:
+    from doorstate.rules.base import Rule
+
+RULES = {
+    "open_door": "doorstate.rules.open_door:OpenDoorRule",
+    "plane_state": "doorstate.rules.plane_state:PlaneStateRule",
+    "wall_leaf_angle": "doorstate.rules.wall_leaf_angle:WallLeafAngleRule",
+    "angle_bins": "doorstate.rules.angle_bins:AngleBinsRule",
+    "depth_region": "doorstate.rules.depth_region:DepthRegionRule",
 }
+"""Rules by name, as module:class."""
 
 
 def list_rules() -> list[str]:
@@ -32,4 +37,5 @@ def create_rule(name: str) -> Rule[Any]:
     """
     if name not in RULES:
         raise unknown_name("rule", name, list(RULES))
-    return RULES[name]()
+    module, _, class_name = RULES[name].partition(":")
+    return cast("Rule[Any]", getattr(import_module(module), class_name)())
