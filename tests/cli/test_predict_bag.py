@@ -68,7 +68,7 @@ def test_table_has_a_row_for_each_message(predict: Run, weights: Path, bag: Path
 def test_predictions_equal_those_of_the_cloud_in_a_file(
     predict: Run, weights: Path, bag: Path, tmp_path: Path
 ) -> None:
-    np.save(tmp_path / "cloud.npy", POINTS.reshape(-1, 3))
+    np.save(tmp_path / "cloud.npy", POINTS)
     from_file = json.loads(predict(tmp_path / "cloud.npy", "--weights", weights, "--json")[1])
     code, out, _ = predict("--bag", bag, "--weights", weights, "--json", "--every", 2)
     rows = [json.loads(line) for line in out.splitlines()]

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from doorstate.errors import ConfigError
+from doorstate.inference.abstention import Abstention
 from doorstate.inference.prediction import Prediction
 from doorstate.inference.predictor import Predictor
 from doorstate.serving.access import Access
@@ -58,6 +59,8 @@ class MeanPredictor(Predictor):
             np.ones(2**31, np.float64)
         if order == FAULT:
             raise ZeroDivisionError
+        if order == INVALID:
+            return Prediction.abstain(Abstention("invalid_outputs"), num_points=500)
         points = self.prepare(cloud).points
         p = float(np.clip(np.abs(points).mean() / 10, 0.01, 0.9))
         return Prediction(
@@ -68,7 +71,7 @@ class MeanPredictor(Predictor):
         )
 
 
-WAIT, SLEEP, CRASH, TAKE_MEMORY, FAULT = 90.0, 91.0, 92.0, 93.0, 94.0
+WAIT, SLEEP, CRASH, TAKE_MEMORY, FAULT, INVALID = 90.0, 91.0, 92.0, 93.0, 94.0, 95.0
 """Coordinates of a first point, as orders to `MeanPredictor`."""
 
 

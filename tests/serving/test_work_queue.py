@@ -18,6 +18,7 @@ from tests.serving.helpers import (
     CLOUD,
     CRASH,
     FAULT,
+    INVALID,
     NPY,
     SLEEP,
     TAKE_MEMORY,
@@ -63,6 +64,17 @@ def test_worker_that_takes_too_long_or_ends_is_replaced() -> None:
         error_of(client.post("/predict?format=npy", content=order(CRASH)), 500)
         assert client.post("/predict?format=npy", content=NPY).status_code == 200
         assert "ZeroDivisionError" in error_of(client.post("/predict?format=npy", content=order(FAULT)), 500)
+        assert client.get("/health").json()["ready"]
+
+
+def test_broken_network_is_unhealthy() -> None:
+    with serving() as client:
+        response = client.post("/predict?format=npy", content=order(INVALID)).raise_for_status().json()
+        assert response["state"] is None
+        health = client.get("/health")
+        assert health.status_code == 503
+        assert not health.json()["ready"]
+        assert client.post("/predict?format=npy", content=NPY).status_code == 200
         assert client.get("/health").json()["ready"]
 
 

@@ -140,7 +140,7 @@ class _Lane:
         worker = self._idle.get()
         try:
             reply = worker.run(job, timeout_s)
-            self.problem = reply.body["error"] if reply.status == 503 else ""
+            self.problem = reply.fault
             return reply
         finally:
             self._idle.put(worker)

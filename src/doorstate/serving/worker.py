@@ -49,6 +49,7 @@ class Reply(NamedTuple):
 
     status: int
     body: dict[str, Any]
+    fault: str = ""  # of the worker or its network, whatever the file
 
 
 class Method(NamedTuple):
@@ -126,7 +127,7 @@ class Worker:
         except (EOFError, OSError):
             problem = error_reply(500, "the worker process ended while it processed the file")
         except DoorstateError as error:
-            problem = error_reply(503, str(error))
+            problem = error_reply(503, str(error))._replace(fault=str(error))
         self._restart()
         return problem
 
@@ -197,8 +198,10 @@ def predict_file(predictor: Predictor, job: Job, max_bytes: int) -> Reply:
     try:
         file = read_body(job.content, job.headers, max_bytes)
         cloud, pose = parse_posed_cloud(file.content, job.suffix or file.suffix, job.options)
-        prediction = prediction_to_dict(require_points(predictor(cloud)), format_parameter)
-        return Reply(200, prediction | {"sensor_pose": pose.to_dict()})
+        prediction = require_points(predictor(cloud))
+        record = prediction_to_dict(prediction, format_parameter) | {"sensor_pose": pose.to_dict()}
+        is_faulty = prediction.abstention is not None and prediction.abstention.code == "invalid_outputs"
+        return Reply(200, record, prediction.reason if is_faulty else "")
     except HTTPException as error:
         return error_reply(error.status_code, error.detail)
     except CloudContentError as error:
