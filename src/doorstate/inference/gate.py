@@ -53,7 +53,8 @@ class Gate:
             that the packaged weights were trained on (3.5 m).
         max_hole_share: largest share of the columns with holes and no such floor; chosen: 0.25 m of a door 3 m away
             with a lens of 60 degrees.
-        max_outlier_share: largest share of outliers among the measured points; chosen: recorded frames have up to 0.063, simulated ones 0.002.
+        max_outlier_share: largest share of outliers among the measured points; chosen: recorded frames have up to
+            0.063, simulated ones fewer.
         margin_share: columns ignored on each side; chosen: stereo and registered cameras measure nothing in up to a
             tenth.
 
