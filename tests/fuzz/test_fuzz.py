@@ -52,6 +52,12 @@ def test_failures_are_noticed(read: object, monkeypatch: pytest.MonkeyPatch) -> 
         targets.check(read)  # type: ignore[arg-type]
 
 
+_REPEATED_COLUMNS = (
+    b"method,fnld,role,0,test,method,fold,role,_po,pen,reaso.5,\n_open,p_open,reason,opening_angle_dgo,epef_or_not\n"
+    b"pointnet,5,test,a,open,closed,0.8,0.1,0.1,,12.5,\n"
+)
+
+
 @pytest.mark.parametrize(
     ("name", "data"),
     [
@@ -64,6 +70,7 @@ def test_failures_are_noticed(read: object, monkeypatch: pytest.MonkeyPatch) -> 
         ("data/manifest.csv", b"sample_id,state\na,open\na,open\nb,closed\n"),
         ("predictions.csv.gz", gzip.compress(b"fold\n" + b"9" * 30)),
         ("predictions.csv.gz", gzip.compress(b"fold\n1,2,3\n")),
+        ("predictions.csv.gz", gzip.compress(_REPEATED_COLUMNS)),
         (
             "metrics.json",
             b'{"runs": [{"method": "pointnet", "fold": -9, "metrics": {}, "environment": {}, "log": {}}]}',

@@ -56,6 +56,7 @@ def read_predictions(path: Path) -> pd.DataFrame:
         with warnings.catch_warnings():
             # pandas only warns where it cuts off a line that is longer than the header.
             warnings.simplefilter("error", pd.errors.ParserWarning)
+            warnings.simplefilter("error", RuntimeWarning)  # NumPy's, for what is no whole number
             frame = pd.read_csv(
                 path,
                 dtype={**dict.fromkeys(TEXT_COLUMNS, "str"), "fold": "int64"},
@@ -66,7 +67,15 @@ def read_predictions(path: Path) -> pd.DataFrame:
             )
         numeric = [name for name in frame if name not in (*TEXT_COLUMNS, "fold")]
         frame = frame.astype(dict.fromkeys(numeric, "float64"))
-    except (OSError, EOFError, zlib.error, ValueError, OverflowError, pd.errors.ParserWarning) as error:
+    except (
+        OSError,
+        EOFError,
+        zlib.error,
+        ValueError,
+        OverflowError,
+        pd.errors.ParserWarning,
+        RuntimeWarning,
+    ) as error:
         raise RunError(f"cannot be read ({error})", path=path) from error
     for name in KEY_COLUMNS:
         if name not in frame:
