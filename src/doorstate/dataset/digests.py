@@ -47,7 +47,7 @@ def file_digest(path: Path) -> str:
 @lru_cache(maxsize=64)
 def _digest(path: Path, inode: int, size: int, modified_ns: int) -> str:
     with gzip.open(path) if path.suffix == ".gz" else path.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()  # type: ignore[arg-type]
+        return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 def roles_digest(roles: Mapping[str, Role]) -> str:
