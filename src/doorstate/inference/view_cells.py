@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from doorstate.types import Points
 
@@ -109,6 +108,8 @@ def _sparse_cells(points: NDArray[np.float64], places: NDArray[np.float64]) -> C
         points: (N, 3) metres.
         places: (N, 2) place in the view, 0 to 1 to the right and down.
     """
+    from scipy.spatial import cKDTree  # takes longer to import than an image of points to predict
+
     tree = cKDTree(places)
     spacing = np.asarray(tree.query(places, [_NEIGHBOUR + 1])[0])[:, 0]
     across = (np.arange(_SPARSE_COLUMNS) + 0.5) / _SPARSE_COLUMNS
