@@ -109,6 +109,19 @@ def graphs(
 
 
 @app.command()
+def frames(
+    recordings: Annotated[Path, typer.Argument(help="Folder of recorded frames with an index.csv.")],
+) -> None:
+    """Publish predictions on recorded frames, which are not in the repository, into results/real."""
+    from doorstate.cli.progress import progress_bar
+
+    from .frames import publish_frames
+
+    with progress_bar("Predicting") as progress:
+        print(publish_frames(recordings, progress))
+
+
+@app.command()
 def answers(
     names: Annotated[
         list[str] | None, typer.Argument(help="Packaged weights; all of them if not given.")

@@ -46,8 +46,8 @@ def write_answers(names: Iterable[str], count: int, progress: Progress) -> Path:
         predictor = NetworkPredictor.from_weights(name)
         presets = trained_presets(predictor.card.trained_on)
         measured = {
-            "clean": count_answers(predictor, gazebo_frames(), progress),
-            "simulated": count_answers(predictor, simulated_doors(presets, count), progress),
+            "clean": count_answers(predictor, gazebo_frames(), 20, progress),
+            "simulated": count_answers(predictor, simulated_doors(presets, count), count, progress),
             "recorded": recorded_answers(paths.PRETRAINED / f"{name}.safetensors"),
         }
         counts[name] = {key: value.model_dump() for key, value in measured.items() if value is not None}
@@ -55,14 +55,17 @@ def write_answers(names: Iterable[str], count: int, progress: Progress) -> Path:
     return path
 
 
-def count_answers(predictor: Predictor, examples: Iterable[Example], progress: Progress) -> AnswerCount:
-    """Count answers and right ones."""
+def count_answers(
+    predictor: Predictor, examples: Iterable[Example], total: int, progress: Progress
+) -> AnswerCount:
+    """Count answers and right ones among about `total` examples."""
     frames = answered = right = 0
     for frames, (state, cloud) in enumerate(examples, 1):
         predicted = predictor(cloud).state
         answered += predicted is not None
         right += predicted == state
-        progress(frames, frames)
+        progress(min(frames, total - 1), total)
+    progress(total, total)
     return AnswerCount(frames=frames, answered=answered, right=right)
 
 
@@ -97,13 +100,11 @@ def simulated_doors(presets: list[str], count: int) -> Iterator[Example]:
 
 def recorded_answers(weights: Path) -> AnswerCount | None:
     """Return the published counts on recorded frames with a door; None if these weights were not tested on them."""
-    digest = hashlib.sha256(weights.read_bytes()).hexdigest()
-    tested = read_json(paths.RESULTS / "real" / "experiment.json")["weights"]
-    method = next((entry["experiment"] for entry in tested if digest.startswith(entry["sha256"])), None)
-    if method is None:
+    tested = read_json(paths.RESULTS / "real" / "experiment.json")
+    if hashlib.sha256(weights.read_bytes()).hexdigest() != tested["sha256"]:
         return None
     rows = read_frames()
-    rows = rows[(rows["method"] == method) & rows["state"].isin(STATES)]
+    rows = rows[(rows["method"] == tested["network"]) & rows["state"].isin(STATES)]
     return AnswerCount(
         frames=len(rows), answered=int(rows["predicted"].isin(STATES).sum()), right=int(rows["correct"].sum())
     )

@@ -33,11 +33,14 @@ def content() -> Mapping[str, Any]:
     experiment = read_json(FOLDER / "experiment.json")
     predictions = read_frames()
     scores = summarize_frames(predictions)
+    own = predictions[predictions["method"] == experiment["network"]]
     return {
-        "command": experiment["command"],
-        "newest": experiment["weights"][0],
-        "scores": scores_table(scores, experiment["weights"]).to_markdown(),
-        "confusion": confusion_table(predictions, experiment["weights"][0]["experiment"]).to_markdown(),
+        "experiment": experiment,
+        "readable": len(own),
+        "sensors": own["sensor"].nunique(),
+        "by_state": own["state"].value_counts().to_dict(),
+        "scores": scores_table(scores).to_markdown(),
+        "confusion": confusion_table(predictions, experiment["network"]).to_markdown(),
         "doors": int(scores["frames"].iloc[0]),
     }
 
@@ -45,10 +48,11 @@ def content() -> Mapping[str, Any]:
 def read_frames() -> pd.DataFrame:
     """Read the predictions on recorded frames: one row for each method and frame.
 
-    `method` is a rule, or the experiment that trained the PointNet++; frames of one `door` depend on each other.
+    Frames of one `door` depend on each other; frames without one are each a door of their own.
     """
     frame = pd.read_csv(FOLDER / "predictions.csv.gz", keep_default_na=False, na_values=[""])
-    return frame.assign(correct=frame["predicted"] == frame["state"])
+    door = frame["door"].where(frame["door"].notna(), "/" + frame["sample_id"])
+    return frame.assign(correct=frame["predicted"] == frame["state"], door=door)
 
 
 def summarize_frames(predictions: pd.DataFrame) -> pd.DataFrame:
@@ -60,10 +64,13 @@ def summarize_frames(predictions: pd.DataFrame) -> pd.DataFrame:
     """
     scores = score_frames(predictions, predictions["door"], {})
     rows = predictions.assign(
-        likeliest=np.array(STATES)[predictions[list(PROBABILITY_COLUMNS)].to_numpy().argmax(axis=1)]
+        likeliest=np.array(STATES)[
+            predictions[list(PROBABILITY_COLUMNS)].fillna(-1.0).to_numpy().argmax(axis=1)
+        ]
         == predictions["state"]
     )
-    likeliest = rows[rows["state"].isin(STATES)].groupby("method")["likeliest"].sum()
+    evaluated = rows["p_closed"].notna() & rows["state"].isin(STATES)
+    likeliest = rows[evaluated].groupby("method")["likeliest"].sum()
     networks = rows.loc[rows["p_door"].notna(), "method"].unique()
     without = scores.without_door[scores.without_door["label"] == "no_door"].set_index("method")
     table = scores.scores
@@ -74,12 +81,11 @@ def summarize_frames(predictions: pd.DataFrame) -> pd.DataFrame:
     )
 
 
-def scores_table(scores: pd.DataFrame, weights: list[Mapping[str, Any]]) -> Table:
-    """Build the table of scores; PointNet++ is listed by the experiment of its weights."""
-    titles = {entry["experiment"]: f"PointNet++, `{entry['experiment']}`" for entry in weights}
+def scores_table(scores: pd.DataFrame) -> Table:
+    """Build the table of scores, of the default network and the rules."""
 
     def title(name: str) -> str:
-        return titles.get(name, name if " " in name else f"`{name}`")
+        return name if " " in name else f"`{name}`"
 
     columns = (
         Column("method", ("method",), title, is_label=True),
@@ -100,6 +106,18 @@ def scores_table(scores: pd.DataFrame, weights: list[Mapping[str, Any]]) -> Tabl
     return Table.from_frame("Recorded frames", scores, columns, note)
 
 
+def summary_table(scores: pd.DataFrame) -> Table:
+    """Build the short table of the README."""
+    columns = (
+        Column("method", ("method",), lambda name: name if " " in name else f"`{name}`", is_label=True),
+        count_column("correct", "right"),
+        count_column("wrong"),
+        count_column("abstained", "no answer"),
+        count_column("named", "no door, yet an answer"),
+    )
+    return Table.from_frame("Recorded frames", scores, columns)
+
+
 def confusion_table(predictions: pd.DataFrame, method: str) -> Table:
     """Build the confusion matrix of one method."""
     own = predictions[(predictions["method"] == method) & predictions["state"].isin([*STATES, "no_door"])]
@@ -110,4 +128,4 @@ def confusion_table(predictions: pd.DataFrame, method: str) -> Table:
         label_column("state", "true state"),
         *(count_column(name, STATE_WORDS[name]) for name in counts.columns),
     )
-    return Table.from_frame("PointNet++, newest weights", counts.reset_index(), columns)
+    return Table.from_frame("Predictions of the default network", counts.reset_index(), columns)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Page of `doorstate view` in Chromium, coloured by the points that decided the packaged PointNet++."""
+"""Page of `doorstate view` in Chromium, with the predicted door over a cloud."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ def draw() -> bytes:
     with tempfile.TemporaryDirectory() as folder, open_browser_page() as (page, _):
         path = Path(folder) / "view.html"
         path.write_text(html, encoding="utf-8")
-        page.set_viewport_size({"width": 1100, "height": 700})
+        page.set_viewport_size({"width": 1200, "height": 720})
         page.goto(f"{path.as_uri()}#{SELECTED}")
         page.wait_for_selector("#plot canvas")
-        page.click("[data-color=channels]")
+        page.click("[data-color=height]")
         page.wait_for_timeout(2000)  # until the cloud is drawn
         return page.screenshot()
