@@ -32,7 +32,7 @@ _STATISTICS_POINTS = 8192
 
 @dataclass(frozen=True)
 class Gate:
-    """Reject clouds that do not show enough to tell a state; docs/deployment.md has the measured figures.
+    """Reject clouds that do not show enough to tell a state; docs/gate.md has the measured figures.
 
     Args:
         min_points: least number of measured points; the largest neighbourhood of a network.
