@@ -20,6 +20,7 @@ from doorstate.evaluation.heads import head_rows
 from doorstate.evaluation.resolution import fewest_points, score_resolution
 from doorstate.evaluation.results import Results
 from doorstate.inference.export import write_weights_graph
+from doorstate.networks.digest import write_packaged_digests
 from doorstate.networks.packaged import packaged_networks, packaged_weights
 from doorstate.networks.weights import load_weights, save_weights
 from doorstate.training.calibration import abstain_threshold, at_temperature
@@ -74,16 +75,21 @@ def package_weights(
         )
         path = (out or paths.PRETRAINED) / f"{prefix}{network_name}.safetensors"
         save_weights(path, network, card, half=True)
+        if out is None:
+            write_packaged_digests()
         write_weights_graph(path)
         parameters = sum(parameter.numel() for parameter in network.parameters())
         write_text(path.with_suffix(".md"), model_card(path, card, parameters, Training.read(run), evidence))
         stored.append(path)
+    if out is None:
+        write_packaged_digests()
     return stored
 
 
 def package_graphs(names: Sequence[str] = ()) -> list[Path]:
-    """Write the ONNX graphs of packaged weights beside them; those of all if no names are given."""
-    return [write_weights_graph(packaged_weights(name)) for name in names or packaged_networks()]
+    """Write the ONNX graphs of packaged weights, of all if no names are given, and the digests of packaged files."""
+    graphs = [write_weights_graph(packaged_weights(name)) for name in names or packaged_networks()]
+    return [*graphs, write_packaged_digests()]
 
 
 def recipe_evidence(network: str, trained_points: int) -> Evidence:

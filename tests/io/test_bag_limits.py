@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 import sqlite3
 import time
 from contextlib import closing
@@ -13,6 +14,7 @@ import numpy as np
 import pytest
 
 pytest.importorskip("rosbags")
+
 
 from doorstate.errors import CloudReadError
 from doorstate.io import bag_limits
@@ -40,6 +42,36 @@ def test_truncated_packed_data_is_refused(
     monkeypatch.setattr(bag_limits, "_unpack", lambda new, packed: unpack(new, packed[:-5]))
     with pytest.raises(CloudReadError, match="truncated"):
         read_one(path)
+
+
+def test_files_that_fill_the_disk_are_not_unpacked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = write_bag(tmp_path, "db3", [cloud("/points", ORGANIZED)], "FILE")
+    (packed,) = folder.glob("*.zstd")
+    monkeypatch.setattr(bag_limits, "MAX_UNPACKED", 2000)
+    np.testing.assert_array_equal(read_one(folder), ORGANIZED)
+    packed.write_bytes(bag_limits._zstd().compress(bytes(1 << 22)))
+    for limit in ("_MAX_RATIO", "_MAX_DISK_SHARE"):
+        monkeypatch.setattr(bag_limits, limit, 0)
+        with pytest.raises(CloudReadError, match="unpacks to more than"):
+            read_one(folder)
+        monkeypatch.undo()
+
+
+@pytest.mark.parametrize("target", ["/dev/zero", "pipe", "../outside"])
+def test_bag_folders_hold_regular_files_of_their_own(target: str, tmp_path: Path) -> None:
+    folder = write_bag(tmp_path, "db3", [cloud("/points", ORGANIZED)], "FILE")
+    (packed,) = folder.glob("*.zstd")
+    packed.rename(tmp_path / "outside")
+    name = "other.name"  # of a file that only the metadata names
+    metadata = folder / "metadata.yaml"
+    metadata.write_text(metadata.read_text().replace(packed.name, name))
+    if target == "pipe":
+        os.mkfifo(folder / name)
+    else:
+        (folder / name).symlink_to(target)
+    with pytest.raises(CloudReadError) as caught:
+        read_one(folder)
+    assert caught.value.path == folder / name
 
 
 @pytest.mark.parametrize(

@@ -132,12 +132,14 @@ def test_bags_are_regular_files(tmp_path: Path) -> None:
         read_error(tmp_path / name)
     folder = write_bag(tmp_path, "db3", [cloud("/points", ORGANIZED)])
     (link := tmp_path / "linked").mkdir()
+    folder = folder.rename(link / "content")
     for file in folder.iterdir():
         (link / file.name).symlink_to(file)
     np.testing.assert_array_equal(read_one(link), ORGANIZED)
-    (link / f"{folder.name}.db3").unlink()
-    os.mkfifo(link / f"{folder.name}.db3")
-    with pytest.raises(CloudReadError, check=about(link / f"{folder.name}.db3")):
+    (database,) = link.glob("*.db3")
+    database.unlink()
+    os.mkfifo(database)
+    with pytest.raises(CloudReadError, check=about(database)):
         read(link)
 
 

@@ -32,7 +32,7 @@ def write(path: Path, header: object, data: bytes) -> Path:
         arrays.arrays(
             st.sampled_from([np.float16, np.float32, np.float64, np.int64]),
             arrays.array_shapes(min_dims=0, max_dims=3, min_side=0, max_side=4),
-            elements={"allow_nan": False},
+            elements={"allow_nan": False, "allow_infinity": False},
         ),
         max_size=5,
     )

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any, Self
 
 from pydantic import Field, ValidationError
@@ -16,6 +17,8 @@ from doorstate.errors import WeightsError, first_validation_error
 from doorstate.types import STATES
 
 CARD_KEY = "doorstate"  # of the card, in the metadata of weights files and exported networks
+DIGEST_KEY = "digest"  # of the file, in its card (networks.digest)
+_DIGEST = re.compile("sha256:[0-9a-f]{64}")
 
 
 class WeightsCard(FrozenModel):
@@ -39,13 +42,17 @@ class WeightsCard(FrozenModel):
 
     @classmethod
     def parse(cls, text: str) -> Self:
-        """Return the card of a JSON text.
+        """Return the card of a JSON text, which may hold the digest of its file too.
 
         Raises:
             WeightsError: it is no card.
         """
         try:
-            return cls.model_validate(parse_json(text, WeightsError))
+            content = parse_json(text, WeightsError)
+            digest = content.pop(DIGEST_KEY, None) if isinstance(content, dict) else None
+            if digest is not None and not (isinstance(digest, str) and _DIGEST.fullmatch(digest)):
+                raise WeightsError("is no SHA-256", field=DIGEST_KEY)
+            return cls.model_validate(content)
         except ValidationError as error:
             raise WeightsError(first_validation_error(error)) from error
 

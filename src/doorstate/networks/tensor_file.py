@@ -7,6 +7,7 @@ Eight bytes hold the length of a header in JSON, which gives type, shape and pla
 
 from __future__ import annotations
 
+import io
 import math
 from pathlib import Path
 from typing import Annotated, BinaryIO, NamedTuple
@@ -16,9 +17,10 @@ from numpy.typing import NDArray
 from pydantic import Field, StringConstraints, TypeAdapter, ValidationError
 
 from doorstate._documents import parse_json
-from doorstate._input import open_input
+from doorstate._input import open_input, read_input
 from doorstate._models import FrozenModel
 from doorstate.errors import WeightsError, first_validation_error
+from doorstate.networks.digest import check_digest
 
 MAX_BYTES = 1 << 30  # of a file; the largest packaged one has 7 MB
 _MAX_HEADER_BYTES = 1 << 20
@@ -71,12 +73,10 @@ def read_tensors(path: Path) -> dict[str, NDArray[np.generic]]:
     """Read all tensors of a safetensors file.
 
     Raises:
-        WeightsError: as `read_header`, or a number is not finite.
+        WeightsError: as `read_header`, the file differs from its digest, or a number is not finite.
     """
-    with open_input(path, MAX_BYTES, WeightsError) as stream:
-        header = _read_header(stream, path)
-        stream.seek(0)
-        content = stream.read()
+    content = read_weights_file(path)
+    header = _read_header(io.BytesIO(content), path)
     tensors = {
         name: np.frombuffer(content, place.dtype, math.prod(place.shape), place.offset).reshape(place.shape)
         for name, place in header.tensors.items()
@@ -85,6 +85,17 @@ def read_tensors(path: Path) -> dict[str, NDArray[np.generic]]:
         if not np.isfinite(tensor).all():
             raise WeightsError("holds numbers that are not finite: damaged", path=path, field=name)
     return tensors
+
+
+def read_weights_file(path: Path) -> bytes:
+    """Return the bytes of a weights file or exported network, compared with its digest.
+
+    Raises:
+        WeightsError: the file is missing or too large, or differs from its digest.
+    """
+    content = read_input(path, MAX_BYTES, WeightsError)
+    check_digest(content, path)
+    return content
 
 
 def _read_header(stream: BinaryIO, path: Path) -> TensorHeader:

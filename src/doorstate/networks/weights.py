@@ -6,8 +6,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import torch
-from safetensors import SafetensorError, safe_open
-from safetensors.torch import save
+from safetensors import SafetensorError
+from safetensors.torch import load, save
 
 from doorstate._files import atomic_path
 from doorstate.errors import WeightsError
@@ -15,7 +15,9 @@ from doorstate.networks import create_network
 from doorstate.networks.base import PointNetwork
 from doorstate.networks.card import CARD_KEY, WeightsCard
 from doorstate.networks.card_file import check_card, read_card
+from doorstate.networks.digest import add_digest, card_with_digest
 from doorstate.networks.head_layers import add_heads
+from doorstate.networks.tensor_file import read_weights_file
 
 _FLOATS = (torch.float16, torch.float32, torch.float64)
 
@@ -27,7 +29,7 @@ def save_weights(path: Path, network: PointNetwork, card: WeightsCard, half: boo
         for name, tensor in network.state_dict().items()
     }
     with atomic_path(path) as temporary:
-        temporary.write_bytes(save(tensors, {CARD_KEY: card.model_dump_json()}))
+        temporary.write_bytes(add_digest(save(tensors, {CARD_KEY: card_with_digest(card)})))
 
 
 def load_weights(path: Path) -> tuple[PointNetwork, WeightsCard]:
@@ -54,11 +56,11 @@ def load_into(network: PointNetwork, path: Path) -> None:
     """Copy the tensors of a weights file into a network, float16 as float32.
 
     Raises:
-        WeightsError: a tensor has another type than in the network, or is not finite.
+        WeightsError: the file differs from its digest, or a tensor is not finite or of another type than that of the
+            network.
         RuntimeError: a tensor is missing, unknown, or of another shape.
     """
-    with safe_open(path, framework="pt") as weights:
-        tensors = {name: weights.get_tensor(name) for name in weights.keys()}  # noqa: SIM118 - not a dict
+    tensors = load(read_weights_file(path))
     own = network.state_dict()
     for name, tensor in tensors.items():
         is_float = name in own and own[name].is_floating_point()

@@ -13,7 +13,7 @@ from doorstate.inference.backends.threads import default_threads
 from doorstate.networks.card import CARD_KEY, WeightsCard
 from doorstate.networks.card_file import read_card
 from doorstate.networks.heads import POINT_HEADS, head_columns
-from doorstate.networks.tensor_file import read_tensors
+from doorstate.networks.tensor_file import read_tensors, read_weights_file
 from doorstate.types import PARTS, STATES, Points
 
 if TYPE_CHECKING:
@@ -82,8 +82,7 @@ def is_in_graph(name: str) -> bool:
 def _open_session(path: Path, threads: int, weights: Path | None, spinning: bool) -> Any:
     import onnxruntime  # takes a tenth of a second
 
-    if not path.is_file():
-        raise WeightsError("no such weights file", path=path)
+    content = read_weights_file(path)
     options = onnxruntime.SessionOptions()
     options.log_severity_level = _LOG_ERRORS_ONLY
     options.intra_op_num_threads = threads
@@ -97,7 +96,7 @@ def _open_session(path: Path, threads: int, weights: Path | None, spinning: bool
         }
         options.add_external_initializers(list(tensors), list(tensors.values()))
     try:
-        return onnxruntime.InferenceSession(path, options, providers=["CPUExecutionProvider"])
+        return onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
     except Exception as error:  # onnxruntime's errors have no common class of their own
         if any(word in str(error) for word in _NEWER):
             raise WeightsError(

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from doorstate import __version__
 from doorstate.clouds.normalization import SCALE_M
 from doorstate.networks.card import CARD_KEY, WeightsCard
+from doorstate.networks.digest import card_with_digest
 from doorstate.networks.heads import HEADS
 from doorstate.types import STATES
 
@@ -33,5 +34,5 @@ def describe(model: ModelProto, card: WeightsCard, more: Mapping[str, str] = Map
     """Write the description of a graph, further entries and its card into its metadata."""
     import onnx
 
-    onnx.helper.set_model_props(model, _DESCRIPTION | dict(more) | {CARD_KEY: card.model_dump_json()})
+    onnx.helper.set_model_props(model, _DESCRIPTION | dict(more) | {CARD_KEY: card_with_digest(card)})
     model.producer_name, model.producer_version = "doorstate", __version__

@@ -18,6 +18,7 @@ from doorstate.inference.gate import DEFAULT_GATE, Gate
 from doorstate.inference.reference_clouds import LabelledClouds
 from doorstate.networks.base import PointNetwork
 from doorstate.networks.card import WeightsCard
+from doorstate.networks.digest import add_digest
 
 if TYPE_CHECKING:
     from onnx import ModelProto
@@ -70,7 +71,7 @@ def export_onnx(
             raise ExportError(
                 f"{card.network} cannot be exported with opset {opset}: {summarize_exception(error)}"
             ) from error
-        onnx.save(model, temporary)
+        temporary.write_bytes(add_digest(model.SerializeToString()))
         parity = compare_with_torch(temporary, network, card, clouds, progress)
         if not (int8 or parity.max_difference <= parity.tolerance):
             raise ExportError(
