@@ -52,7 +52,11 @@ nitpick_ignore_regex = [
         "py:.*",
         r"(doorstate\.rules\.base\.)?P|Points|Indices|Floats|Columns|Tensor|NDArray|Path|NoneType",
     ),  # type variables, and bare names in NamedTuples
-    ("py:class", r"FieldInfo|Ge|_PydanticGeneralMetadata"),  # constraints of pydantic
+    # Constraints of pydantic, and their limits.
+    (
+        "py:class",
+        r"FieldInfo|G[et]|L[et]|M(ax|in)Len|_PydanticGeneralMetadata|[\d.e+-]+|doorstate[\w.]*\._check_\w+",
+    ),
 ]
 
 REPOSITORY = Path(__file__).resolve().parents[1]

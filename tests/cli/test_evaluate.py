@@ -16,7 +16,7 @@ from doorstate.simulation.frames import replay
 from doorstate.simulation.presets import PRESETS, draw_rows
 from doorstate.types import ABSTAINED
 from tests.cli.helpers import Run, check_error
-from tests.headless_chromium import open_browser_page
+from tests.headless_chromium import open_browser_page, wait_until
 
 
 @pytest.fixture(scope="module")
@@ -82,8 +82,9 @@ def test_page_draws_clouds_and_filters_frames(report: Path) -> None:
         sources = page.evaluate("[...document.images].map((image) => image.src.slice(0, 15))")
         assert sources == ["data:image/jpeg"] * 8  # the photo and seven depth images
         page.locator(".card .cloud").first.scroll_into_view_if_needed()
-        page.wait_for_function(
-            "document.querySelector('.card canvas').getContext('2d').getImageData(0, 0, 150, 100).data.some((v) => v)"
+        wait_until(
+            page,
+            "document.querySelector('.card canvas').getContext('2d').getImageData(0, 0, 150, 100).data.some((v) => v)",
         )
         chips = page.locator(".chips button")
         assert chips.evaluate_all("(all) => all.map((chip) => chip.dataset.choice)") == [

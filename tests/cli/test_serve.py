@@ -57,9 +57,3 @@ def test_used_port_is_one_line(run: Run, weights: Path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as used:
         port = used.getsockname()[1]
         check_error(run("serve", "--port", port, "--weights", weights), 1, str(port))
-
-
-def test_missing_packages_are_named(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "uvicorn", None)
-    monkeypatch.delitem(sys.modules, "doorstate.serving.server", raising=False)
-    check_error(run("serve"), 1, "fastapi", "uvicorn")

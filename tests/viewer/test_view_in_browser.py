@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import io
+import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,7 +20,7 @@ from doorstate.types import Part
 from doorstate.viewer.cloud_page import Entry, make_entry, render_cloud_page
 from doorstate.viewer.live_page import LivePage
 from doorstate.viewer.named_clouds import NamedCloud
-from tests.headless_chromium import open_browser_page
+from tests.headless_chromium import open_browser_page, wait_until
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -62,9 +63,7 @@ def count_color(color: str, picture: np.ndarray) -> int:
 
 
 def wait_for_text(page: Page, selector: str, text: str) -> None:
-    page.wait_for_function(
-        "([s, text]) => document.querySelector(s).textContent === text", arg=[selector, text]
-    )
+    wait_until(page, f"document.querySelector({json.dumps(selector)}).textContent === {json.dumps(text)}")
 
 
 def test_page_shows_clouds_one_after_the_other(
@@ -74,7 +73,7 @@ def test_page_shows_clouds_one_after_the_other(
     path = tmp_path / "view.html"
     path.write_text(render_cloud_page(predictor, entries), encoding="utf-8")
     page.goto(path.as_uri())
-    page.wait_for_function(f"({LEGEND}).includes('leaf')")
+    wait_until(page, f"({LEGEND}).includes('leaf')")
     assert page.text_content("#name") == "closed door"
     assert "closed" in (page.text_content("#state .badge") or "")
     assert page.locator("#list li").count() == len(entries)
@@ -115,7 +114,7 @@ def test_cloud_fills_the_canvas_and_turns(
     for width, height in ((1280, 800), (390, 844)):
         page.set_viewport_size({"width": width, "height": height})
         page.goto(path.as_uri())
-        page.wait_for_function(f"({LEGEND}).length > 0")
+        wait_until(page, f"({LEGEND}).length > 0")
         pixels(page)
         filled = page.evaluate(FILLED)
         assert max(filled) > 0.75, f"the cloud is small at {width} x {height}"
@@ -143,7 +142,7 @@ def test_detections_are_drawn(browser: Browser, clouds: list[NamedCloud], tmp_pa
     path = tmp_path / "rule.html"
     path.write_text(render_cloud_page(rule, [make_entry(rule, clouds[1])]), encoding="utf-8")
     page.goto(path.as_uri())
-    page.wait_for_function(f"({LEGEND}).length > 1")
+    wait_until(page, f"({LEGEND}).length > 1")
     assert {"wall", "leaf"} <= set(page.evaluate(LEGEND))
     assert page.locator("[data-color=channels]").is_hidden()
     assert errors == []
@@ -157,7 +156,7 @@ def test_live_page_follows_until_the_user_goes_back(
         page.goto(live.address)
         live.publish("cloud", entries[0])
         wait_for_text(page, "#name", "closed door")
-        page.wait_for_function(f"({LEGEND}).length > 0")
+        wait_until(page, f"({LEGEND}).length > 0")
         live.publish("cloud", entries[1])
         wait_for_text(page, "#place", "2 / 2")
         page.click("#previous")

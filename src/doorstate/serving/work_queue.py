@@ -94,7 +94,7 @@ class WorkQueue:
 
 
 def _is_text(content: bytes) -> bool:
-    """Return whether a file starts as one of text; binary files have only a short header of text."""
+    """Return True if a file starts as one of text; binary files have only a short header of text."""
     start = content[:_TEXT_SAMPLE]
     return start.isascii() and not start.translate(None, _TEXT)
 
