@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How often packaged weights answer, and how often rightly: on clean frames, simulated doors and recorded frames."""
+"""Share of clean, simulated and recorded frames that packaged weights answer, and answer rightly."""
 
 from __future__ import annotations
 

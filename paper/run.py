@@ -32,7 +32,7 @@ def run(name: str) -> None:
 
 
 def is_finished(name: str) -> bool:
-    """Return whether all runs of a comparison are in `runs/`."""
+    """Return True if all runs of a comparison are in `runs/`."""
     folder = paths.RUNS / name
     if not (folder / "comparison.json").is_file():
         return False

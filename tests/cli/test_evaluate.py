@@ -3,15 +3,20 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
+import io
 import json
+import sys
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 from PIL import Image
 
 from doorstate._files import write_csv
+from doorstate.cli import main, progress
 from doorstate.simulation.frames import replay
 from doorstate.simulation.presets import PRESETS, draw_rows
 from doorstate.types import ABSTAINED
@@ -43,40 +48,57 @@ def recordings(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+class Report(NamedTuple):
+    """Folder that a command has written, and what it printed."""
+
+    folder: Path
+    code: int
+    out: str
+    err: str
+
+
 @pytest.fixture(scope="module")
-def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("report")
+def report(recordings: Path, weights: Path, tmp_path_factory: pytest.TempPathFactory) -> Report:
+    folder = tmp_path_factory.mktemp("report")
+    arguments = ["evaluate", recordings, "--weights", weights, "--rule", "plane_state", "--by", "door:glass"]
+    out, err = io.StringIO(), io.StringIO()
+    with (
+        pytest.MonkeyPatch.context() as patch,
+        contextlib.redirect_stdout(out),
+        contextlib.redirect_stderr(err),
+    ):
+        patch.setattr(sys, "argv", ["doorstate", *map(str, arguments), "--all", "--out", str(folder)])
+        patch.setattr(progress, "FIRST_LINE_S", 3600.0)
+        with pytest.raises(SystemExit) as ended:
+            main()
+    return Report(folder, int(ended.value.code or 0), out.getvalue(), err.getvalue())
 
 
-def test_predictions_are_scored_and_written(recordings: Path, report: Path, weights: Path, run: Run) -> None:
-    code, out, err = run(
-        "evaluate",
-        recordings,
-        *("--weights", weights, "--rule", "plane_state", "--by", "door:glass", "--all", "--out", report),
-    )
+def test_predictions_are_scored_and_written(report: Report) -> None:
+    folder, code, out, err = report
     assert code == 1  # one file could not be read
     assert err.startswith("coarse.png: ")
     assert err.count("coarse.png") == 1
     assert "plane_state" in out
-    metrics = json.loads((report / "metrics.json").read_text(encoding="utf-8"))
+    metrics = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
     correct = {row["method"]: row["correct"] for row in metrics["scores"]}
     assert list(correct)[:2] == ["pointnet", "plane_state"]
     assert list(metrics["unreadable"]) == ["coarse.png"]
     # Doors without noise at 2 to 3 m are easy for the rule.
     assert correct["plane_state"] >= 5
-    with (report / "predictions.csv").open(encoding="utf-8") as file:
+    with (folder / "predictions.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 2 * 7
     assert (
         sum(row["predicted"] == row["state"] for row in rows if row["method"] == "plane_state")
         == correct["plane_state"]
     )
-    assert (report / "tables" / "recall.csv").is_file()
+    assert (folder / "tables" / "recall.csv").is_file()
 
 
-def test_page_draws_clouds_and_filters_frames(report: Path) -> None:
+def test_page_draws_clouds_and_filters_frames(report: Report) -> None:
     with open_browser_page() as (page, errors):
-        page.goto((report / "frames.html").as_uri())
+        page.goto((report.folder / "frames.html").as_uri())
         assert page.locator(".card").count() == 7
         assert page.locator(".card .cloud").count() == 14
         sources = page.evaluate("[...document.images].map((image) => image.src.slice(0, 15))")
@@ -96,7 +118,7 @@ def test_page_draws_clouds_and_filters_frames(report: Path) -> None:
         visible = page.locator(".card:not([hidden])").evaluate_all(
             "(all) => all.map((card) => card.dataset.file)"
         )
-        with (report / "predictions.csv").open(encoding="utf-8") as file:
+        with (report.folder / "predictions.csv").open(encoding="utf-8") as file:
             rows = [row for row in csv.DictReader(file) if row["method"] == "plane_state"]
         correct = {"no_door": ABSTAINED}
         wrong = {row["file"] for row in rows if row["predicted"] != correct.get(row["state"], row["state"])}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is installed, in plain words, for `doorstate info` and reports of problems; imports no large package."""
+"""Packages and weights that are installed, for `doorstate info` and reports of problems; imports no large package."""
 
 from __future__ import annotations
 

@@ -83,7 +83,7 @@ def image_topic(topic: str) -> str:
 
 
 def is_rectified(topic: str) -> bool | None:
-    """Return whether images of a topic are rectified, by the names of image_proc; None if the name does not tell."""
+    """Return True if images of a topic are rectified, by the names of image_proc; None if the name does not tell."""
     name = image_topic(topic).rpartition("/")[2]
     if "rect" in name:
         return True

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How often packaged weights answer, and rightly, as measured by `python -m paper answers`; needs no torch."""
+"""Share of frames that packaged weights answer, and answer rightly; `python -m paper answers` measures it."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ class Access:
     token: str | None = None
 
     def allows_host(self, host: str) -> bool:
-        """Return whether a Host header is served."""
+        """Return True if a Host header is served."""
         try:
             name = (urlsplit(f"//{host}").hostname or "").rstrip(".")
         except ValueError:
@@ -48,7 +48,7 @@ class Access:
         return name in own or _is_address(name)
 
     def allows_token(self, authorization: str) -> bool:
-        """Return whether an Authorization header has the token."""
+        """Return True if an Authorization header has the token."""
         if self.token is None:
             return True
         scheme, _, token = authorization.partition(" ")

@@ -22,7 +22,7 @@ class Connections:
         self.headless: OrderedDict[GuardedProtocol, None] = OrderedDict()
 
     def admit(self, client: str) -> bool:
-        """Return whether one more connection of this address is served; an older one without a head may end for it."""
+        """Return True if one more connection of this address is served; an older one without a head may end for it."""
         if self.by_client[client] >= self.limits.client_connections:
             return False
         if self.by_client.total() >= self.limits.connections:
