@@ -23,8 +23,14 @@ if [ -z "$python" ]; then
 fi
 
 "$python" -m venv --clear "$venv"
-"$venv/bin/python" -m pip install --quiet --disable-pip-version-check -r requirements.lock
-"$venv/bin/python" -m pip install --quiet --disable-pip-version-check --no-deps --editable .
+install() { "$venv/bin/python" -m pip install --quiet --disable-pip-version-check "$@"; }
+
+# The lock file has the sums of PyTorch's builds for CPUs; that of PyPI for Linux needs gigabytes of CUDA. Torch alone is
+# looked for in that index, and pip goes on without it where another place has the same file.
+install --retries 0 --require-hashes --no-deps --extra-index-url https://download.pytorch.org/whl/cpu \
+  -r <(sed -n '/^torch==/,/[^\\]$/p' requirements.lock)
+install --require-hashes -r requirements.lock
+install --no-deps --no-build-isolation --editable .
 # Quick sampling ships as source. Without a compiler the NumPy form gives the same indices, ten times slower.
-"$venv/bin/python" -m pip install --quiet --disable-pip-version-check --no-deps "$(sed -n 's/^# optional: //p' requirements.lock)" \
+install --require-hashes --no-deps -r <(sed -n 's/^# optional: //p' requirements.lock) \
   || echo "setup: fpsample was not built (no C++ compiler?): sampling falls back to NumPy" >&2

@@ -3,9 +3,9 @@
 set -euo pipefail
 venv=$1
 
-if ! cmp --silent "$venv/.complete" <(cat requirements.lock ros2/requirements.txt); then
+if ! cmp --silent "$venv/.complete" <(cat requirements.lock ros2/requirements.lock); then
   bash tools/setup.sh "$venv"
-  "$venv/bin/python" -m pip install --quiet --disable-pip-version-check -r ros2/requirements.txt -c requirements.lock
-  cat requirements.lock ros2/requirements.txt > "$venv/.complete"
+  "$venv/bin/python" -m pip install --quiet --disable-pip-version-check --require-hashes -r ros2/requirements.lock
+  cat requirements.lock ros2/requirements.lock > "$venv/.complete"
 fi
 exec "$venv/bin/python" -m pytest tests/ros2
