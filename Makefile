@@ -4,14 +4,17 @@
 # make reproduce: the paper's comparison from nothing (EXPERIMENT=by-pose: that file of paper/experiments/);
 # make publish: results of EXPERIMENT into results/, and the pages that follow from them into docs/;
 # make report: tables, figures and report of EXPERIMENT from results/ into build/;
-# make reproduce-check: compare all published tables with those that the committed predictions give.
+# make reproduce-check: compare all published tables with those that the committed predictions give;
+# make lock: versions and hashes of all packages (OPTIONS=--upgrade: the newest); make audit: known vulnerabilities in them;
+# make dist: wheel, sdist and the wheel's bill of materials, in dist/.
 VENV := .venv
 BIN := $(VENV)/bin
 DEMO := demo
+RELEASE := build/release
 
 EXPERIMENT := paper
 
-.PHONY: setup check test test-ros2 docs demo fresh-install reproduce publish report reproduce-check lock clean
+.PHONY: setup check test test-ros2 docs demo fresh-install reproduce publish report reproduce-check lock audit dist clean
 
 setup: $(VENV)/.complete
 
@@ -54,10 +57,19 @@ report: setup
 reproduce-check: setup
 	$(BIN)/python -m paper check
 
-# Resolve again what setup installs; torch stays pinned, since a free torch brings gigabytes of CUDA.
-lock:
-	bash tools/lock.sh $(VENV) > requirements.lock.new
-	mv requirements.lock.new requirements.lock
+lock: setup
+	$(BIN)/python tools/lock.py $(OPTIONS)
+
+$(RELEASE)/.complete: tools/release.lock
+	$(or $(PYTHON),python3) -m venv --clear $(RELEASE)
+	$(RELEASE)/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r tools/release.lock
+	touch $@
+
+audit: $(RELEASE)/.complete
+	$(RELEASE)/bin/python tools/audit.py
+
+dist: $(RELEASE)/.complete
+	bash tools/dist.sh $(RELEASE) dist
 
 clean:
 	rm -rf $(VENV) $(VENV)-ros2 $(DEMO) build dist

@@ -18,6 +18,11 @@ from urllib.request import urlopen
 REPOSITORY = Path(__file__).resolve().parents[1]
 LOCK = REPOSITORY / "requirements.lock"
 _ANY_PLATFORM = ("--universal", "--fork-strategy", "fewest")
+PARTS = {  # in the versions of requirements.lock
+    "tools/release.lock": ("--group", "release", *_ANY_PLATFORM),
+    "requirements-light.lock": ("pyproject.toml", *_ANY_PLATFORM),
+    "ros2/requirements.lock": ("ros2/requirements.txt", "--python-platform", "x86_64-manylinux_2_28"),
+}
 _OPTIONAL = "# optional: "  # tools/setup.sh reads this comment
 _CPU_INDEX = "https://download.pytorch.org/whl/cpu/torch/"
 _WHEEL = r"torch-{}(?:\+cpu)?-cp31[123]-cp31[123]-{}\.whl#sha256=([0-9a-f]{{64}})"
@@ -25,21 +30,16 @@ _PLATFORM = r"(?:manylinux_2_28_(?:x86_64|aarch64)|macosx_\w+_arm64)"
 
 
 def main() -> None:
-    """Resolve, and replace the lock files only if all could be resolved."""
-    new = {
-        LOCK: _resolve(LOCK, "pyproject.toml", "--extra", "dev", "--extra", "fast", *_ANY_PLATFORM),
-        REPOSITORY / "tools/release.lock": _resolve(
-            REPOSITORY / "tools/release.lock", "--group", "release", *_ANY_PLATFORM
-        ),
-    }
-    new[LOCK] = _optional_sampling(_torch_for_cpus(new[LOCK], LOCK.read_text(encoding="utf-8")))
-    for path, text in new.items():
-        path.write_text(f"# Written by 'make lock'.\n{text}", encoding="utf-8")
-    # ROS comes as wheels for Linux alone, beside everything else.
-    ros = REPOSITORY / "ros2/requirements.lock"
-    platform = ("--python-platform", "x86_64-manylinux_2_28", "--constraints", LOCK)
-    text = _resolve(ros, "ros2/requirements.txt", *platform)
-    ros.write_text(f"# Written by 'make lock'.\n{text}", encoding="utf-8")
+    """Resolve requirements.lock, and the others in its versions."""
+    lock = _resolve(LOCK, "pyproject.toml", "--extra", "dev", "--extra", "fast", *_ANY_PLATFORM)
+    _write(LOCK, _optional_sampling(_torch_for_cpus(lock, LOCK.read_text(encoding="utf-8"))))
+    for name, arguments in PARTS.items():
+        path = REPOSITORY / name
+        _write(path, _resolve(path, *arguments, "--constraints", LOCK))
+
+
+def _write(path: Path, lock: str) -> None:
+    path.write_text(f"# Written by 'make lock'.\n{lock}", encoding="utf-8")
 
 
 def _resolve(lock: Path, *arguments: str | Path) -> str:
