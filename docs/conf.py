@@ -66,6 +66,7 @@ _OUTSIDE_PAGES = {
     "contributing": "CONTRIBUTING.md",
     "log": "paper/log.md",
     "ros2": "ros2/README.md",
+    "security": "SECURITY.md",
 }
 
 

@@ -27,7 +27,7 @@ def main() -> None:
         packages = json.loads(report.read_text(encoding="utf-8"))["dependencies"] if report.exists() else []
     audited = [package for package in packages if "skip_reason" not in package]
     if not audited:
-        *_, reason = finished.stderr.splitlines() if not packages else ["it knows none of the packages"]
+        reason = "it knows none of the packages" if packages else finished.stderr.strip().rpartition("\n")[2]
         print(f"audit: skipped, no index of advisories can be reached: {reason[:300]}")
         return
     found = [(package, entry) for package in audited for entry in package["vulns"]]
