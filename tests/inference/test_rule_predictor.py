@@ -41,7 +41,7 @@ def test_the_gate_rejects_a_pane_of_glass(name: str) -> None:
     prediction = RulePredictor.from_name(name)(cloud)
     assert prediction.state is None
     assert prediction.abstention is not None
-    assert prediction.abstention.code == "hole"
+    assert prediction.abstention.code == "door_hole"
     rule = create_rule(name)
     assert RulePredictor(rule, gate=None)(cloud).reason == rule(cloud).reason
 

@@ -30,9 +30,9 @@ def test_answers_and_right_ones_are_counted() -> None:
     cloud = np.ones((300, 3), np.float32)
     examples = [("open", cloud), ("closed", cloud), ("open", cloud[:0])]
     done: list[int] = []
-    counted = count_answers(SaysOpen(), examples, lambda number, total: done.append(number))
+    counted = count_answers(SaysOpen(), examples, 3, lambda number, total: done.append(number))
     assert counted == AnswerCount(frames=3, answered=2, right=1)
-    assert done == [1, 2, 3]
+    assert (done, done[-1]) == (sorted(done), 3)
 
 
 def test_clean_frames_hold_doors_in_all_states() -> None:
