@@ -116,7 +116,7 @@ def test_errors_are_printed_beside_the_table(predict: Run, weights: Path, faulty
     assert code == 1
     assert err.partition(":")[0] == STAMPS[1]
     assert [stamp in out for stamp in STAMPS] == [True, False, True, True]
-    assert " none " in out
+    assert " abstained " in out
 
 
 def test_predictions_before_damage_are_kept(predict: Run, weights: Path, tmp_path: Path) -> None:

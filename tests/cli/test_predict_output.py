@@ -68,7 +68,7 @@ def test_reason_is_below_its_row_without_numbers_that_look_like_an_answer(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     _, row, reason = printed([("a.pcd", REFUSED)], monkeypatch)
-    assert row.split() == ["a.pcd", "none", "-", "-", "-", "-", "25"]
+    assert row.split() == ["a.pcd", "abstained", "-", "-", "-", "-", "25"]
     assert reason.strip() == REFUSED["reason"].strip()
 
 

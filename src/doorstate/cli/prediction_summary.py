@@ -10,7 +10,7 @@ from statistics import median
 from typing import Any
 
 from doorstate.cli.console import stderr, stdout
-from doorstate.types import STATES
+from doorstate.types import ABSTAINED, STATES
 
 
 class PredictionSummary:
@@ -64,7 +64,7 @@ class PredictionSummary:
         failed = f"; no prediction for {self.failures}" if self.failures else ""
         for method, states in self._states.items():
             counts = [f"{states[state]} {state}" for state in STATES if states[state]]
-            counts += [f"{states[None]} none"] if states[None] else []
+            counts += [f"{states[None]} {ABSTAINED}"] if states[None] else []
             label = f"{method}: " if len(self._states) > 1 else ""
             stdout.print(
                 f"{label}{self._count(self.clouds)}: {', '.join(counts)}{failed}; "

@@ -12,6 +12,7 @@ from rich.text import Text
 
 from doorstate.cli import console
 from doorstate.cli.console import printable
+from doorstate.types import ABSTAINED
 
 _STATE_STYLES = {"closed": "red", "semi_open": "yellow", "open": "green"}
 _MISSING = "-"
@@ -92,7 +93,7 @@ class PredictionTable:
         self._last_name = name
         line = Text(_fit(f"  {row['method']}" if self._by_method else printable(name), self._name_width))
         state = row["state"]
-        line.append(f"{_GAP}{state or 'none':<{_STATE_WIDTH}}", _STATE_STYLES.get(state, "bold"))
+        line.append(f"{_GAP}{state or ABSTAINED:<{_STATE_WIDTH}}", _STATE_STYLES.get(state, "bold"))
         for column in _COLUMNS:
             line.append(f"{_GAP}{column.cell(row):>{column.width}}")
         console.stdout.print(line)

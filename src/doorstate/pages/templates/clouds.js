@@ -49,10 +49,13 @@ const clouds = (() => {
     return [quantile(z, 0.01), quantile(z, 0.99)];
   }
 
-  function byHeight(cloud, [low, high] = heightRange(cloud)) {
+  const metresAbove = (floor, z) => (Math.round(10 * (z - floor)) / 10 || 0).toFixed(1); // without a minus before 0.0
+
+  function byHeight(cloud, floor = 0) {
+    const [low, high] = heightRange(cloud);
     return {
       colors: Array.from(heights(cloud), (z) => viridis(clamp((z - low) / (high - low || 1)))),
-      legend: [{ name: "height", gradient: gradient(VIRIDIS), low: `${low.toFixed(1)}`, high: `${high.toFixed(1)} m` }],
+      legend: [{ name: "height above the floor", gradient: gradient(VIRIDIS), low: metresAbove(floor, low), high: `${metresAbove(floor, high)} m` }],
     };
   }
 
@@ -147,7 +150,10 @@ const clouds = (() => {
       const [u, v] = places[places.length - 1];
       [pen.strokeStyle, pen.lineWidth, pen.fillStyle] = [card, 3 * scale, color];
       pen.textAlign = side > 0 ? "start" : "end";
-      for (const write of ["strokeText", "fillText"]) pen[write](label, u + side * 7 * scale, v + 4 * scale);
+      const [room, at] = [pen.measureText(label).width + 3 * scale, u + side * 7 * scale];
+      const isSeen = u >= 0 && u <= pen.canvas.width; // what lies outside has no label at the edge
+      const inside = side > 0 ? Math.min(at, pen.canvas.width - room) : Math.max(at, room);
+      for (const write of ["strokeText", "fillText"]) pen[write](label, isSeen ? inside : at, v + 4 * scale);
     }
   }
 

@@ -30,7 +30,7 @@
 
   function colored(entry, cloud, color) {
     if (color === "part") return clouds.byPart(cloud);
-    return color === "channels" ? clouds.byChannels(clouds.channelsOf(entry)) : clouds.byHeight(cloud);
+    return color === "channels" ? clouds.byChannels(clouds.channelsOf(entry)) : clouds.byHeight(cloud, entry.floor_z_m);
   }
 
   // ---- rulers ----------------------------------------------------------------------------------------------
@@ -81,7 +81,7 @@
     view.show({
       layers: [{ cloud: whole, ...clouds.byHeight(whole), size: 1.6, opacity: PALE }, { cloud, ...style, size: 2.6 }],
       lines: [...distanceArcs(whole, entry.floor_z_m), ...heightRuler(whole, entry.floor_z_m), ...door],
-      margin: plot.clientWidth < 500 ? 26 : 36, axes: true,
+      margin: 40, axes: true,
     });
     const drawn = new Map(door.map((line) => [line.name, line]));
     element("legend").replaceChildren(...legend.map(swatch), ...[...drawn.values()].map(swatch));
@@ -107,17 +107,26 @@
   const degrees = (value) => (value === undefined ? "" : `${value.toFixed(0)}°`);
 
   const axes = (pose) => pose && `${pose.axes} (${pose.axes_from})`;
-  const tilt = (pose) => pose && `${degrees(pose.pitch_deg)} down, ${degrees(pose.roll_deg)} clockwise (${pose.tilt_from})`;
+
+  function tilt(pose) {
+    if (!pose) return "";
+    const [pitch, roll] = [Math.round(pose.pitch_deg), Math.round(pose.roll_deg)];
+    const turns = [
+      pitch && `${Math.abs(pitch)}° ${pitch > 0 ? "down" : "up"}`,
+      roll && `${Math.abs(roll)}° ${roll > 0 ? "clockwise" : "counter-clockwise"}`,
+    ];
+    return `${turns.filter(Boolean).join(", ") || "level"} (${pose.tilt_from})`;
+  }
 
   const facts = (prediction) => [
-    ["opened", degrees(prediction.opening_angle_deg)],
-    ["free width", metres(prediction.passable_width_m)],
+    ["angle", degrees(prediction.opening_angle_deg)],
+    ["passable", metres(prediction.passable_width_m)],
     ["distance", prediction.door_x_m === undefined ? "" : metres(Math.hypot(prediction.door_x_m, prediction.door_y_m))],
     ["hinge", prediction.hinge],
-    ["points used", prediction.points.toLocaleString("en")],
+    ["points", prediction.points.toLocaleString("en")],
     ["time", `${prediction.milliseconds.toFixed(0)} ms`],
-    ["axes", axes(prediction.sensor_pose)],
-    ["camera tilt", tilt(prediction.sensor_pose)],
+    ["axes", axes(prediction.sensor_pose), "wide"],
+    ["camera", tilt(prediction.sensor_pose), "wide"],
   ];
 
   function describe(entry) {
@@ -139,7 +148,7 @@
       }));
     element("reason").textContent = entry.error || prediction?.reason || "";
     element("facts").replaceChildren(...(prediction ? facts(prediction) : []).filter(([, value]) => value).flatMap(
-      ([name, value]) => [make("dt", {}, name), make("dd", {}, value)]));
+      ([name, value, className = ""]) => [make("dt", { className }, name), make("dd", { className }, value)]));
   }
 
   function show(index) {
