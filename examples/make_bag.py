@@ -22,6 +22,7 @@ from doorstate.simulation.camera import CameraPose, DepthCamera
 from doorstate.simulation.render import cut_range, render
 from doorstate.simulation.scene import Door, Opening, Scene, scene_boxes
 
+DOOR = Door(leaf_recess_m=0.08)  # a leaf flush with a plain wall can hardly be told from it
 CAMERA = DepthCamera(width=320, height=240)
 CAMERA_POSE = CameraPose(x_m=-0.3, y_m=2.4, z_m=1.0, yaw_rad=math.radians(-83))  # the wall is at y = 0
 SECONDS, FRAMES_PER_S = 8, 5
@@ -36,7 +37,7 @@ def opening_angle_deg(time_s: float) -> float:
 
 def depth_millimetres(angle_deg: float) -> np.ndarray:
     """Return a (H, W) uint16 depth image of the door, 0 where nothing was measured."""
-    scene = scene_boxes(Scene(door=Door(), has_ceiling=False), Opening(angle_deg=angle_deg))
+    scene = scene_boxes(Scene(door=DOOR, has_ceiling=False), Opening(angle_deg=angle_deg))
     depth_m = cut_range(render(scene, CAMERA_POSE, CAMERA.intrinsics()), CAMERA).depth_m
     return np.nan_to_num(depth_m * 1000).round().astype("<u2")
 
