@@ -29,7 +29,7 @@ def stamped_clouds(recording: Path) -> Iterator[tuple[float, Points]]:
 
 def main(recording: Path) -> int:
     """Print every change, then wait; return the exit code."""
-    predictor = Predictor.load(rule="plane_state")  # or Predictor.load(budget_ms=33)
+    predictor = Predictor.load()  # or Predictor.load(budget_ms=33)
     state_filter = StateFilter()
     start_s = previous = None
     for stamp_s, cloud in stamped_clouds(recording):

@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -131,18 +132,23 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def outcomes(folder: Path) -> Outcomes:
-    job = json.dumps([OPTIONAL, list(COMMANDS), list(CALLS)])
+    return run_without(OPTIONAL, list(COMMANDS), list(CALLS), folder)
+
+
+def run_without(
+    hidden: Sequence[str], commands: list[tuple[str, ...]], calls: list[str], folder: Path
+) -> Outcomes:
     done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", RUN, job],
+        [sys.executable, "-W", "error", "-c", RUN, json.dumps([hidden, commands, calls])],
         cwd=folder,
         text=True,
         capture_output=True,
         check=False,
     )
     assert (done.returncode, done.stderr) == (0, "")
-    commands, hints, loaded = json.loads(done.stdout)
+    ran, hints, loaded = json.loads(done.stdout)
     return Outcomes(
-        dict(zip(COMMANDS, commands, strict=True)), dict(zip(CALLS, hints, strict=True)), set(loaded)
+        dict(zip(commands, ran, strict=True)), dict(zip(calls, hints, strict=True)), set(loaded)
     )
 
 
@@ -160,6 +166,13 @@ def test_commands_work_or_name_the_extra(arguments: tuple[str, ...], outcomes: O
 def test_public_functions_work_or_name_the_extra(call: str, outcomes: Outcomes) -> None:
     extra = CALLS[call]
     assert outcomes.hints[call] == (None if extra is None else f'pip install "doorstate[{extra}]"')
+
+
+@pytest.mark.parametrize(("extra", "module"), [("serve", "doorstate.serving.app"), ("bags", "doorstate.io.bags")])
+def test_an_extra_brings_all_that_its_feature_imports(extra: str, module: str, folder: Path) -> None:
+    others = [name for name in OPTIONAL if name not in EXTRAS[extra]]
+    call = f"import_module({module!r})"
+    assert run_without(others, [("info",)], [call], folder).hints == {call: None}
 
 
 def test_a_network_answers_without_what_only_rules_need(outcomes: Outcomes) -> None:

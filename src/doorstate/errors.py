@@ -175,7 +175,7 @@ EXTRAS = {
         "jinja2",
     ),
     "onnx": ("onnx", "onnxscript"),
-    "serve": ("fastapi", "uvicorn", "prometheus_client"),
+    "serve": ("fastapi", "uvicorn", "prometheus_client", "jinja2"),
     "bags": ("rosbags",),
 }
 """Modules of the optional dependencies, by the name of the extra that installs them (pyproject.toml)."""
@@ -241,7 +241,9 @@ def unknown_name(
         field: parameter that holds the name.
     """
     names = list(names)
-    close = get_close_matches(name, names, n=1) or [other for other in names if name.lower() in other.lower()]
+    alike = {other.lower(): other for other in names}
+    close = [alike[match] for match in get_close_matches(name.lower(), alike, n=1)]
+    close += [other for other in names if name.lower() in other.lower()]
     hint = f"did you mean {close[0]!r}?" if close else f"names are {', '.join(names) or 'none'}"
     return error(f"unknown {kind} {name!r}", field=field, hint=hint)
 

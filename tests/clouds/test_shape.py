@@ -20,13 +20,23 @@ def sampled_from(points: Points, seed: int) -> Points:
 
 
 @pytest.mark.parametrize(
-    "cloud", [np.zeros((5, 4)), np.zeros(3), np.zeros((2, 2, 2, 3)), np.array([["a", "b", "c"]])]
+    ("cloud", "hint"),
+    [
+        (np.zeros((5, 4)), "x, y and z only"),
+        (np.zeros((3, 500)), "transpose"),
+        (np.zeros((3, 48, 64)), "transpose"),
+        (np.zeros((48, 64)), "depth image"),
+        (np.zeros(5, dtype=[("x", "f4"), ("y", "f4"), ("z", "f4")]), "fields"),
+        (np.zeros(3), None),
+        (np.zeros((2, 2, 2, 3)), None),
+        (np.array([["a", "b", "c"]]), None),
+    ],
 )
-def test_other_shapes_and_types_are_refused(cloud: np.ndarray) -> None:
+def test_other_shapes_and_types_are_refused(cloud: np.ndarray, hint: str | None) -> None:
     with pytest.raises(CloudContentError) as caught:
         check_shape(cloud)
     assert caught.value.expected is not None
-    assert (caught.value.hint is not None) == (cloud.shape == (5, 4))
+    assert hint is None if caught.value.hint is None else hint and hint in caught.value.hint
 
 
 def test_images_and_stacked_clouds() -> None:

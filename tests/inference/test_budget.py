@@ -5,9 +5,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from doorstate.errors import ConfigError
 from doorstate.inference.budget import wall_and_floor
 from doorstate.inference.gate import Gate
 from doorstate.inference.network_predictor import NetworkPredictor
@@ -44,3 +46,18 @@ def test_the_scene_of_the_measurement_passes_the_gate() -> None:
     scene = wall_and_floor()
     assert scene.shape == (480, 640, 3)
     assert Gate()(scene) is None
+
+
+@pytest.mark.parametrize(
+    ("options", "field"),
+    [
+        ({"budget_ms": 0.0}, "budget_ms"),
+        ({"budget_ms": float("nan")}, "budget_ms"),
+        ({"budget_ms": 33.0, "num_points": 512}, "budget_ms"),
+        ({"threads": 0}, "threads"),
+    ],
+)
+def test_impossible_budgets_and_threads_are_refused(options: dict[str, Any], field: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        NetworkPredictor.from_weights(**options)
+    assert caught.value.field == field

@@ -38,7 +38,7 @@ def missing_by_extra() -> dict[str, list[str]]:
     for requirement in _requirements():
         if (match := _REQUIREMENT.match(requirement)) and match[2] not in _FOR_DEVELOPERS:
             packages = missing.setdefault(match[2], [])
-            if version_of(match[1]) is None:
+            if version_of(match[1]) is None and match[1] not in packages:
                 packages.append(match[1])
     return missing
 

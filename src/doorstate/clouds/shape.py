@@ -3,12 +3,17 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from doorstate._organized import is_image
 from doorstate.clouds.measured import quiet_nans
 from doorstate.errors import CloudContentError
 from doorstate.types import Points
+
+_MOST_VALUES = 16  # of a point, such as colour and normal; a longer axis is one of an image
 
 
 def check_shape(points: Points) -> Points:
@@ -20,16 +25,30 @@ def check_shape(points: Points) -> Points:
     """
     cloud = np.asarray(points)
     if cloud.dtype.kind not in "fiu" or cloud.ndim not in (2, 3) or cloud.shape[-1] != 3:
-        has_more_values = cloud.ndim in (2, 3) and 3 < cloud.shape[-1] <= 16
         raise CloudContentError(
             f"{cloud.dtype} of shape {cloud.shape} is not a cloud",
             expected="numbers of shape (N, 3) or (H, W, 3)",
-            hint="keep x, y and z only" if has_more_values else None,
+            hint=_how_to_reshape(cloud),
         )
     if cloud.dtype == np.float16:  # limits of coordinates, and squares of coordinates, exceed its range
         with np.errstate(invalid="ignore"):
             cloud = cloud.astype(np.float32)
     return quiet_nans(cloud)
+
+
+def _how_to_reshape(cloud: NDArray[Any]) -> str | None:
+    """Return how to make a cloud of an array that seems to hold one."""
+    if cloud.dtype.names is not None and {"x", "y", "z"} <= set(cloud.dtype.names):
+        return "stack the fields x, y and z along a last axis"
+    if cloud.dtype.kind not in "fiu" or cloud.ndim not in (2, 3):
+        return None
+    if cloud.shape[0] == 3 < cloud.shape[-1]:
+        return "transpose it: x, y and z belong on the last axis"
+    if 3 < cloud.shape[-1] <= _MOST_VALUES:
+        return "keep x, y and z only"
+    if cloud.ndim == 2 and min(cloud.shape) > _MOST_VALUES:
+        return "a depth image is made a cloud with the intrinsics of its camera first"
+    return None
 
 
 def check_single_cloud(points: Points) -> Points:

@@ -94,10 +94,14 @@ class NetworkPredictor(Predictor):
             WeightsError: no such weights, or they cannot be used.
             MissingExtraError: torch is needed and not installed.
         """
-        if budget_ms is not None and (num_points is not None or not budget_ms > 0):
+        if budget_ms is not None and num_points is not None:
+            raise ConfigError("give a number of points or a time budget, not both", field="budget_ms")
+        if budget_ms is not None and not budget_ms > 0:
             raise ConfigError(
-                f"a budget of {budget_ms} ms with {num_points} points: give one of them, above zero"
+                f"no cloud is processed in {budget_ms} ms", field="budget_ms", expected="a time above zero"
             )
+        if threads is not None and threads < 1:
+            raise ConfigError(f"a call needs a thread, not {threads}", field="threads", expected="1 or more")
         loaded = load_backend(name_or_path, threads, backend)
 
         def with_points(count: int | None) -> NetworkPredictor:

@@ -53,7 +53,6 @@ def points_from_depth(stored: NDArray[Any], options: ReadOptions) -> PosedCloud:
     if intrinsics is None:
         raise CameraError(
             f"a depth image ({width} x {height} pixels) needs the intrinsics of its camera",
-            field="intrinsics",
             suggestions={"intrinsics": None},
         )
     if isinstance(intrinsics, Pinhole):

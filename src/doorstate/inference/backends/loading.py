@@ -46,6 +46,8 @@ def load_backend(name_or_path: str | Path, threads: int | None = None, backend: 
 
 
 def _load_torch(path: Path) -> Backend:
+    if not path.exists():
+        raise WeightsError("no such weights file", path=path)
     with needs_extra(path.name):
         from doorstate.inference.backends.torch_backend import TorchBackend
         from doorstate.networks.weights import load_weights
