@@ -147,9 +147,7 @@ def run_without(
     )
     assert (done.returncode, done.stderr) == (0, "")
     ran, hints, loaded = json.loads(done.stdout)
-    return Outcomes(
-        dict(zip(commands, ran, strict=True)), dict(zip(calls, hints, strict=True)), set(loaded)
-    )
+    return Outcomes(dict(zip(commands, ran, strict=True)), dict(zip(calls, hints, strict=True)), set(loaded))
 
 
 @pytest.mark.parametrize("arguments", COMMANDS, ids=" ".join)
@@ -168,7 +166,9 @@ def test_public_functions_work_or_name_the_extra(call: str, outcomes: Outcomes) 
     assert outcomes.hints[call] == (None if extra is None else f'pip install "doorstate[{extra}]"')
 
 
-@pytest.mark.parametrize(("extra", "module"), [("serve", "doorstate.serving.app"), ("bags", "doorstate.io.bags")])
+@pytest.mark.parametrize(
+    ("extra", "module"), [("serve", "doorstate.serving.app"), ("bags", "doorstate.io.bags")]
+)
 def test_an_extra_brings_all_that_its_feature_imports(extra: str, module: str, folder: Path) -> None:
     others = [name for name in OPTIONAL if name not in EXTRAS[extra]]
     call = f"import_module({module!r})"
