@@ -57,13 +57,13 @@ report: setup
 reproduce-check: setup
 	$(BIN)/python -m paper check
 
-lock: setup
-	$(BIN)/python tools/lock.py $(OPTIONS)
-
 $(RELEASE)/.complete: tools/release.lock
 	$(or $(PYTHON),python3) -m venv --clear $(RELEASE)
 	$(RELEASE)/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r tools/release.lock
 	touch $@
+
+lock: $(RELEASE)/.complete
+	$(RELEASE)/bin/python tools/lock.py $(OPTIONS)
 
 audit: $(RELEASE)/.complete
 	$(RELEASE)/bin/python tools/audit.py
