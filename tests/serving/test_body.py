@@ -34,7 +34,10 @@ def _status(body: bytes, headers: dict[str, str]) -> int:
     return caught.value.status_code
 
 
-@given(st.binary(max_size=200), st.text(st.characters(codec="utf-8", exclude_categories=["C"]), max_size=20))
+@given(
+    st.binary(max_size=200).filter(lambda content: content[:2] != b"\x1f\x8b"),  # files of gzip are unpacked
+    st.text(st.characters(codec="utf-8", exclude_categories=["C"]), max_size=20),
+)
 @settings(deadline=None, max_examples=100)
 def test_forms_of_httpx_are_read(content: bytes, stem: str) -> None:
     request = _form({"cloud": (f"a{stem}.csv", content, "text/plain")})
@@ -43,8 +46,7 @@ def test_forms_of_httpx_are_read(content: bytes, stem: str) -> None:
         if packed is not request.content:
             headers["content-encoding"] = "gzip"
         upload = read_body(packed, headers, _LIMIT)
-        if content[:2] != b"\x1f\x8b":
-            assert upload.content == content
+        assert upload.content == content
         assert upload.suffix == ".csv"
 
 
