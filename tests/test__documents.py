@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import os
+import time
 from pathlib import Path
 
 import pytest
@@ -94,3 +95,17 @@ def test_pipes_are_refused_without_waiting(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "a.json")
     with pytest.raises(RunError):
         read_json(tmp_path / "a.json")
+
+
+def test_keys_of_thousands_of_parts_are_refused_at_once() -> None:
+    started = time.process_time()
+    for text in (
+        "a." * 500_000 + "b = 1",
+        "[" + "a . " * 500_000 + "b]",
+        '"a".' * 200_000 + "b = 1",
+        "a" * 1_000_000,
+    ):
+        with pytest.raises(ConfigError):
+            parse_toml(text)
+    assert time.process_time() - started < 2
+    assert parse_toml(f"x = '{'a.' * 30}'\n{'a.' * 30}b = 0.1") is not None

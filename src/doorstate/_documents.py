@@ -8,6 +8,7 @@ keys of TOML nest without recursion); an integer of thousands of digits, hexadec
 from __future__ import annotations
 
 import json
+import re
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
@@ -19,6 +20,7 @@ from doorstate.errors import ConfigError, DoorstateError, RunError, summarize_ex
 MAX_RESULTS_BYTES = 1 << 26  # of the metrics and epoch logs of a study
 MAX_DEPTH = 50
 _MAX_INTEGER = 2**63 - 1
+_DEEP_KEY = re.compile(rf"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){{{MAX_DEPTH}}}""")
 
 
 def read_json(
@@ -59,6 +61,8 @@ def read_toml(path: Path, error: type[DoorstateError] = ConfigError) -> dict[str
 
 def parse_toml(text: str, error: type[DoorstateError] = ConfigError) -> dict[str, Any]:
     """Return the content of a TOML text; errors are those of `parse_json`."""
+    if _DEEP_KEY.search(text):  # the parser takes quadratic time
+        raise error("is nested too deeply for TOML", expected=f"at most {MAX_DEPTH} levels")
     content: dict[str, Any] = _parse(tomllib.loads, text, "TOML", error)
     return content
 

@@ -116,7 +116,7 @@ def _in_use(folder: Path, owner: Path) -> FolderInUseError:
     try:
         record = read_json(owner, max_bytes=_MAX_RECORD_BYTES)
         who = f"process {int(record['process'])} on {record['host']} since {record['started']}"
-    except (DoorstateError, ValueError, KeyError, TypeError):
+    except (DoorstateError, ValueError, KeyError, TypeError, OverflowError):
         who = "another process"  # which has not written its record yet
     return FolderInUseError(
         f"is in use by {who}", path=folder, hint="wait for it or end it, or choose another folder"

@@ -1,25 +1,51 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Run the attacks: `python -m tests.attack service --seconds 60`."""
+"""Repeat all attacks, or some: `python -m tests.attack`, `python -m tests.attack weights graphs --rounds 10`.
+
+`python -m tests.attack service --seconds 60` attacks the service, and prints figures instead of a table.
+"""
 
 from __future__ import annotations
 
 import argparse
 import json
+import sys
 import tempfile
+import time
 from pathlib import Path
 
+from tests.attack import ATTACKS
 from tests.attack.service import attack_service
+from tests.attack.tries import Try, table
 
 
 def main() -> None:
-    """Run one attack, and print its outcome as JSON."""
+    """Run attacks and print their table; exit with 1 after an outcome that must not be."""
     parser = argparse.ArgumentParser(prog="python -m tests.attack", description=__doc__)
-    commands = parser.add_subparsers(dest="attack", required=True)
-    service = commands.add_parser("service", help="hostile clients beside honest ones")
-    service.add_argument("--seconds", type=float, default=60.0, help="duration of each part")
+    parser.add_argument(
+        "names", nargs="*", choices=[*ATTACKS, "service", []], help="all but service by default"
+    )
+    parser.add_argument("--rounds", type=int, default=100, help="tries of what is tried at several places")
+    parser.add_argument(
+        "--seconds", type=float, default=60.0, help="duration of each part of the attack on the service"
+    )
     arguments = parser.parse_args()
-    with tempfile.TemporaryDirectory(prefix="doorstate-") as folder:
-        print(json.dumps(attack_service(Path(folder), arguments.seconds), indent=2))
+    if "service" in arguments.names:
+        with tempfile.TemporaryDirectory(prefix="doorstate-") as folder:
+            print(json.dumps(attack_service(Path(folder), arguments.seconds), indent=2))
+        return
+    tries: list[Try] = []
+    for name in arguments.names or ATTACKS:
+        started = time.perf_counter()
+        count = len(tries)
+        with tempfile.TemporaryDirectory(prefix="doorstate-") as folder:
+            for one in ATTACKS[name](Path(folder), arguments.rounds):
+                tries.append(one)
+                if one.violation:
+                    print(f"  {one.kind}: {one.outcome}", file=sys.stderr, flush=True)
+        seconds = time.perf_counter() - started
+        print(f"{name}: {len(tries) - count} in {seconds:.0f} s", file=sys.stderr, flush=True)
+    print(table(tries), end="")
+    sys.exit(any(one.violation for one in tries))
 
 
 if __name__ == "__main__":

@@ -45,3 +45,7 @@ def test_json_lines_are_printable_and_keep_the_text(text: str) -> None:
 def test_file_names_are_no_formulas(name: str) -> None:
     assert console.csv_name(name) == f"./{name}"
     assert console.csv_name("a/" + name) == "a/" + name
+
+
+def test_file_names_in_csv_are_not_obeyed_by_terminals() -> None:
+    assert console.csv_name("\x1b[31ma.npy") == r"\x1b[31ma.npy"

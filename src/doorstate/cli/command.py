@@ -75,6 +75,7 @@ def _termination() -> Iterator[None]:
 @contextmanager
 def reported_errors() -> Iterator[None]:
     """Print an error of this package, or of writing to standard output, as one line, and end the program."""
+    _open_closed_streams()
     try:
         try:
             with needs_extra("this command"):
@@ -97,6 +98,16 @@ def reported_errors() -> Iterator[None]:
         _discard_output()
         _print_error(f"the output cannot be written ({error.strerror or error})")
         sys.exit(1)
+
+
+def _open_closed_streams() -> None:
+    """Let streams that were closed at the start fail as a full disk does; else a file could take their number."""
+    if sys.stdout is None:
+        os.dup2(os.open(os.devnull, os.O_RDONLY), 1)
+        sys.stdout = os.fdopen(1, "w", encoding="utf-8", closefd=False)
+    if sys.stderr is None:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
+        sys.stderr = os.fdopen(2, "w", encoding="utf-8", closefd=False)
 
 
 def _print_error(text: str) -> None:

@@ -56,8 +56,11 @@ def json_line(record: Mapping[str, Any]) -> str:
 
 
 def csv_name(name: str) -> str:
-    """Return a file name that a spreadsheet does not take for a formula; it still names the same file."""
-    return f"./{name}" if name[:1] in ("=", "+", "-", "@", "\t", "\r") else name
+    """Return a file name for a table that neither a spreadsheet nor a terminal obeys.
+
+    One that begins as a formula begins with `./`, and still names the same file; JSON has the exact names of all.
+    """
+    return printable(f"./{name}" if name[:1] in ("=", "+", "-", "@", "\t", "\r") else name)
 
 
 def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:

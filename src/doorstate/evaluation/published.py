@@ -91,7 +91,7 @@ def read_records(path: Path) -> list[RunRecord]:
     """
     try:
         return decode_runs(read_json(path)["runs"])
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise RunError(f"holds no list of runs ({error!r})", path=path) from error
 
 
@@ -104,7 +104,7 @@ def decode_runs(runs: Iterable[Mapping[str, Any]]) -> list[RunRecord]:
     """Return records of runs from what `encode_runs` wrote.
 
     Raises:
-        KeyError, TypeError, ValueError: `runs` is something else.
+        KeyError, TypeError, ValueError, OverflowError: `runs` is something else.
     """
     return [
         RunRecord(

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from doorstate.clouds.normalization import centroids
 from doorstate.errors import WeightsError, summarize_exception
@@ -15,9 +15,6 @@ from doorstate.networks.card_file import read_card
 from doorstate.networks.heads import POINT_HEADS, head_columns
 from doorstate.networks.tensor_file import read_tensors, read_weights_file
 from doorstate.types import PARTS, STATES, Points
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 INPUT, REASON = "points", "reason"
 PROBABILITIES, RAW_PROBABILITIES = "probabilities", "raw_probabilities"
@@ -51,7 +48,7 @@ class OnnxBackend:
     ) -> None:
         self._session = _open_session(path, threads or default_threads(), weights, spinning)
         if weights is None:
-            self.card = _read_card(path, self._session.get_modelmeta().custom_metadata_map)
+            self.card = _read_card(path, self._session)
             self.num_points: int | None = self.card.num_points
         else:
             self.card, self.num_points = read_card(weights), None
@@ -107,10 +104,10 @@ def _open_session(path: Path, threads: int, weights: Path | None, spinning: bool
         raise WeightsError(f"cannot be read as ONNX ({summarize_exception(error)})", path=path) from error
 
 
-def _read_card(path: Path, metadata: Mapping[str, str]) -> WeightsCard:
+def _read_card(path: Path, session: Any) -> WeightsCard:
     try:
-        card = WeightsCard.parse(metadata[CARD_KEY])
-    except (KeyError, WeightsError) as error:
+        card = WeightsCard.parse(session.get_modelmeta().custom_metadata_map[CARD_KEY])
+    except (KeyError, UnicodeDecodeError, WeightsError) as error:
         raise WeightsError(
             "not exported by doorstate: its metadata hold no weights card", path=path, field=CARD_KEY
         ) from error
