@@ -40,13 +40,13 @@ def attack_inputs(folder: Path, rounds: int) -> Iterator[Try]:
             for name in ("dataset.json", "manifest.csv", "clouds.npy")
         ),
     ]
-    for kind, path, arguments in cases[:: 1 if rounds > 1 else 4]:
+    for kind, path, arguments in cases[:: 1 if rounds > 1 else 7]:
         before = path.read_bytes() if path.is_file() else None
         for special in _KINDS:
             path.unlink(missing_ok=True)
             _put(path, special)
             done = Command(folder, arguments).wait(_LONGEST_S)
-            hangs = Try(f"{special} as {kind}", "hangs", Violation.UNCAUGHT)
+            hangs = Try(f"{special} as {path.name}", "hangs", Violation.UNCAUGHT)
             yield (
                 hangs
                 if done.code == -9

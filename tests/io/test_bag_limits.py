@@ -57,6 +57,17 @@ def test_files_that_fill_the_disk_are_not_unpacked(tmp_path: Path, monkeypatch: 
         monkeypatch.undo()
 
 
+@pytest.mark.parametrize("suffix", [".bag", ".db3", ".mcap"])
+def test_gigabytes_of_zeros_are_no_bag(suffix: str, tmp_path: Path) -> None:
+    path = tmp_path / f"a{suffix}"
+    path.touch()
+    os.truncate(path, 200 << 30)
+    started = time.process_time()
+    with pytest.raises(CloudReadError, match="no bag", check=about(path)):
+        read_one(path)
+    assert time.process_time() - started < 1
+
+
 @pytest.mark.parametrize("target", ["/dev/zero", "pipe", "../outside"])
 def test_bag_folders_hold_regular_files_of_their_own(target: str, tmp_path: Path) -> None:
     folder = write_bag(tmp_path, "db3", [cloud("/points", ORGANIZED)], "FILE")

@@ -12,7 +12,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, BinaryIO
 
-from doorstate._input import check_input, read_input_text
+from doorstate._input import open_input, read_input_text
 from doorstate._paths import resolve_inside
 from doorstate.errors import CloudReadError, DatasetError, summarize_exception
 from doorstate.io.plain_yaml import plain_documents
@@ -23,6 +23,7 @@ MAX_UNPACKED = MAX_FILE_BYTES  # bytes of a message or of a chunk of messages
 # Unpacked size of a bag compressed file by file, in packed sizes; depth images of one wall take a twentieth.
 _MAX_RATIO = 50
 _MAX_DISK_SHARE = 0.5  # of the free space for temporary files
+_STARTS = {".bag": b"#ROSBAG V2.0\n", ".db3": b"SQLite format 3\0", ".mcap": b"\x89MCAP0\r\n"}
 
 
 def unpack_zstd(packed: bytes) -> bytes:
@@ -81,7 +82,7 @@ def check_files(path: Path) -> None:
         CloudReadError: it is not, with its path.
     """
     if not path.is_dir():
-        check_input(path)
+        _check_start(path)
         return
     for member in path.iterdir():
         try:
@@ -89,7 +90,7 @@ def check_files(path: Path) -> None:
         except DatasetError as error:
             raise CloudReadError("is a link out of the folder of the bag", path=member) from error
         if not member.is_dir():
-            check_input(member)
+            _check_start(member)
     metadata = path / "metadata.yaml"
     text = read_input_text(metadata, _MAX_METADATA_BYTES)
     if "&" not in text:  # no alias without an anchor; parsing is slow, and rosbags parses again
@@ -98,6 +99,14 @@ def check_files(path: Path) -> None:
         list(plain_documents(text))
     except Exception as error:  # on damaged text the parser raises exceptions of any type
         raise CloudReadError(f"is damaged ({summarize_exception(error)})", path=metadata) from error
+
+
+def _check_start(path: Path) -> None:
+    """Check the first bytes of a file; rosbags would look for the end of a first line in gigabytes of zeros."""
+    start = _STARTS.get(path.suffix, b"")
+    with open_input(path) as stream:
+        if stream.read(len(start)) != start:
+            raise CloudReadError("damaged, or no bag (its first bytes)", path=path)
 
 
 class _UnpackedFile:
