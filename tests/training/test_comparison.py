@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import signal
@@ -144,17 +145,33 @@ if __name__ == "__main__":
 """
 
 
+@pytest.fixture(scope="module")
+def undisturbed(small_dataset: PreparedDataset, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    folder = tmp_path_factory.mktemp("undisturbed") / "c"
+    compare(small_experiment(small_dataset), folder)
+    return read_results(folder)
+
+
+def wait_for_group(group: int, timeout_s: float) -> None:
+    """Wait until all processes of a group have ended, at most the given time: an orphan may stay a zombie."""
+    end_s = time.monotonic() + timeout_s
+    with contextlib.suppress(ProcessLookupError):
+        while time.monotonic() < end_s:
+            os.killpg(group, 0)
+            time.sleep(0.05)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_killed_comparison_continues_exactly(
-    jobs: int, small_dataset: PreparedDataset, tmp_path: Path
+    jobs: int, small_dataset: PreparedDataset, undisturbed: dict[str, Any], tmp_path: Path
 ) -> None:
     settings = small_experiment(small_dataset)
     write(tmp_path / "experiment.json", settings.model_dump_json())
     script = write(tmp_path / "script.py", SCRIPT)
     command = [sys.executable, script, tmp_path / "experiment.json", tmp_path / "killed", str(jobs)]
 
-    process = subprocess.Popen(command)
+    process = subprocess.Popen(command, start_new_session=True)
     deadline = time.monotonic() + 120
     while not list((tmp_path / "killed").rglob("checkpoint.pt")):
         assert time.monotonic() < deadline
@@ -162,13 +179,12 @@ def test_killed_comparison_continues_exactly(
         time.sleep(0.02)
     os.kill(process.pid, signal.SIGKILL)
     process.wait()
-    time.sleep(1.0)  # until the workers have ended too
+    wait_for_group(process.pid, 10.0)  # its workers end too
     assert len(read_results(tmp_path / "killed")) < 4, "killed after the last run"
 
     subprocess.run(command, check=True, timeout=300)
-    compare(settings, tmp_path / "undisturbed")
-    assert read_results(tmp_path / "killed") == read_results(tmp_path / "undisturbed")
-    assert len(read_results(tmp_path / "killed")) == 4
+    assert read_results(tmp_path / "killed") == undisturbed
+    assert len(undisturbed) == 4
 
 
 def test_additional_data_is_trained_on_in_every_fold_and_never_tested(

@@ -16,7 +16,7 @@ from doorstate.dataset.preparation import Preparation
 from doorstate.dataset.prepare import prepare_dataset
 from doorstate.dataset.roles import Role
 from doorstate.dataset.store import PreparedDataset
-from doorstate.errors import ConfigError, DatasetError
+from doorstate.errors import ConfigError, DatasetError, RunError
 from doorstate.rules import create_rule, list_rules
 from doorstate.training.comparison import compare
 from doorstate.training.experiment import Experiment
@@ -70,7 +70,10 @@ def test_predictions_are_those_of_the_rule_on_raw_frames(doors: PreparedDataset,
 def test_finished_run_is_returned_and_empty_run_refused(doors: PreparedDataset, tmp_path: Path) -> None:
     roles: dict[str, Role] = {doors.rows[0]["sample_id"]: "test"}
     first = run_rule(config("depth_region"), doors, roles, tmp_path / "a")
-    assert run_rule(config("depth_region"), doors, {}, tmp_path / "a") == first
+    assert run_rule(config("depth_region"), doors, roles, tmp_path / "a") == first
+    with pytest.raises(RunError) as other:
+        run_rule(config("depth_region"), doors, {}, tmp_path / "a")
+    assert other.value.field == "splits"
     with pytest.raises(DatasetError, match="fold 0"):
         run_rule(config("depth_region"), doors, {}, tmp_path / "b")
 
