@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 import subprocess
 import sys
 from contextlib import nullcontext
@@ -26,7 +27,7 @@ TINY = ("--points", "128", "--batch", "2", "--repeats", "1", "--threads", "1")
 
 
 def run(*arguments: object) -> tuple[int, str, str]:
-    """Return exit code, standard output and standard error of `python -m benchmarks`."""
+    """Return exit code, standard output and errors of `python -m benchmarks`, without lines of progress."""
     process = subprocess.run(
         [sys.executable, "-W", "error", "-m", "benchmarks", *map(str, arguments)],
         cwd=REPOSITORY,
@@ -35,7 +36,9 @@ def run(*arguments: object) -> tuple[int, str, str]:
         text=True,
         check=False,
     )
-    return process.returncode, process.stdout, process.stderr
+    lines = process.stderr.splitlines(keepends=True)
+    errors = "".join(line for line in lines if not re.match(r"\w+: \d+ of \d+, about .* left$", line))
+    return process.returncode, process.stdout, errors
 
 
 def read_results(folder: Path, name: str) -> tuple[dict[str, Any], list[dict[str, Any]], str]:
