@@ -72,8 +72,10 @@ def _parse(parse: Callable[[str], Any], text: str, kind: str, error: type[Doorst
         value = parse(text)
     except RecursionError as problem:
         raise error(f"is nested too deeply for {kind}", expected=f"at most {MAX_DEPTH} levels") from problem
-    except ValueError as problem:  # no JSON or TOML, or an integer of thousands of digits
+    except (json.JSONDecodeError, tomllib.TOMLDecodeError) as problem:
         raise error(f"cannot be read as {kind} ({summarize_exception(problem)})") from problem
+    except ValueError as problem:
+        raise error("holds an integer of thousands of digits", expected="64 bits or less") from problem
     _check_content(value, error)
     return value
 

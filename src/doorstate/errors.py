@@ -251,9 +251,8 @@ def unknown_name(
 def first_validation_error(error: ValidationError, fields: Iterable[str] = ()) -> str:
     """Return the place and text of the first problem, and all fields if one is missing or unknown."""
     problem = error.errors()[0]
-    own = problem.get("ctx", {}).get(
-        "error"
-    )  # of a validator of ours; pydantic writes "Value error, " before it
+    # Of a validator of ours; pydantic writes "Value error, " before it.
+    own = problem.get("ctx", {}).get("error")
     text = ": ".join(filter(None, [".".join(map(str, problem["loc"])), str(own or problem["msg"])]))
     listed = ", ".join(fields) if problem["type"] in ("missing", "extra_forbidden") else ""
     return f"{text}; fields are {listed}" if listed else text

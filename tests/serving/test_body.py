@@ -126,3 +126,10 @@ def test_the_service_reads_forms_and_packed_bodies(client: httpx.Client) -> None
     error_of(client.post("/predict", files={"file": ("cloud.las", b"LASF")}), 415)
     error_of(client.post("/predict?format=npy", content=gzip.compress(bytes(1 << 20)), headers=packed), 413)
     error_of(client.post("/predict?format=npy", files={"file": NPY}, data={"axes": "optical"}), 400)
+
+
+def test_a_format_that_can_be_converted_is_named_with_the_conversion() -> None:
+    with pytest.raises(HTTPException) as caught:
+        Upload(b"LASF", "scan.las", "").suffix  # noqa: B018
+    assert caught.value.status_code == 415
+    assert "laspy" in caught.value.detail

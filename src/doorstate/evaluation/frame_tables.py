@@ -126,5 +126,5 @@ def _without_door_table(scores: FrameScores) -> Table:
             number_column("probability_median", "median probability", 2),
             number_column("probability_max", "largest", 2),
         ),
-        "Probability: of the predicted state. Rules give 1.",
+        "Probability: of the predicted state. Rules give none.",
     )

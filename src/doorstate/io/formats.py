@@ -37,9 +37,14 @@ _MESH = (
     'convert it: pip install trimesh, then python -c "import trimesh; '
     "trimesh.load('cloud{}', force='mesh').export('cloud.ply')\""
 )
+_TIFF = (
+    'convert it: python -c "import numpy; from PIL import Image; '
+    "numpy.save('depth.npy', numpy.asarray(Image.open('depth{}')))\""
+)
 _HINTS = dict.fromkeys((".las", ".laz"), _LAS) | {".e57": _E57}
 _HINTS |= dict.fromkeys((".obj", ".stl", ".off", ".glb"), _MESH)
 _HINTS |= dict.fromkeys(BAG_SUFFIXES, OPEN_BAG_HINT)
+_HINTS |= dict.fromkeys((".tif", ".tiff"), _TIFF)
 _HINTS |= dict.fromkeys((".jpg", ".jpeg"), "JPEG loses depth: save depth images as PNG with 16 bit")
 
 
@@ -63,12 +68,15 @@ def check_suffix(suffix: str) -> None:
         CloudReadError: they cannot; the hint says how to convert them.
     """
     if suffix.lower() not in CLOUD_SUFFIXES:
-        hint = _HINTS.get(suffix.lower())
         raise CloudReadError(
-            f"unknown file type {suffix!r}",
-            expected=" ".join(CLOUD_SUFFIXES),
-            hint=hint and hint.replace("{}", suffix.lower()),
+            f"unknown file type {suffix!r}", expected=" ".join(CLOUD_SUFFIXES), hint=conversion_hint(suffix)
         )
+
+
+def conversion_hint(suffix: str) -> str | None:
+    """Return how to convert files with this suffix, or None."""
+    hint = _HINTS.get(suffix.lower())
+    return hint and hint.replace("{}", suffix.lower())
 
 
 def unpack_gzip(data: bytes) -> bytes:

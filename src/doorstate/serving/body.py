@@ -10,7 +10,13 @@ from typing import NamedTuple
 
 from fastapi import HTTPException
 
-from doorstate.io.formats import CLOUD_SUFFIXES, format_suffix, suffix_of_content, unpack_at_most
+from doorstate.io.formats import (
+    CLOUD_SUFFIXES,
+    conversion_hint,
+    format_suffix,
+    suffix_of_content,
+    unpack_at_most,
+)
 
 BODY_HEADERS = ("content-encoding", "content-type")
 """Headers that say how a body is to be read."""
@@ -41,12 +47,20 @@ class Upload(NamedTuple):
         for suffix in candidates:
             if suffix in CLOUD_SUFFIXES:
                 return suffix
-        raise unknown_format()
+        raise unknown_format(format_suffix(self.name))
 
 
-def unknown_format() -> HTTPException:
-    """Return the error of a file in a format that cannot be read, or that nothing tells."""
+def unknown_format(suffix: str = "") -> HTTPException:
+    """Return the error of a file in a format that cannot be read, or that nothing tells.
+
+    Args:
+        suffix: of the file's name, where it has one.
+    """
     formats = ", ".join(suffix.lstrip(".") for suffix in CLOUD_SUFFIXES)
+    if hint := conversion_hint(suffix):
+        return HTTPException(
+            415, f"unknown file format {suffix.lstrip('.')}; expected one of {formats}; {hint}"
+        )
     return HTTPException(415, f"unknown file format: give the parameter format, one of {formats}")
 
 

@@ -88,7 +88,7 @@ class PredictQuery(BaseModel):
         else:
             suffix = format_suffix(self.filename or "")
         if suffix and suffix not in CLOUD_SUFFIXES:
-            raise unknown_format()
+            raise unknown_format(suffix)
         return suffix or None
 
 
