@@ -96,8 +96,11 @@ def test_without_a_terminal_each_new_epoch_is_a_line(
             {"epoch": n, "points": 256, "centres": 1, "train_loss": 0.5, "seconds": 30.0} for n in range(4)
         ]
         run.write_log(entries)
-        time.sleep(0.1)
-    lines = capsys.readouterr().err.splitlines()
+        errors, end_s = "", time.monotonic() + 30
+        while errors.count("\n") < 2 and time.monotonic() < end_s:
+            time.sleep(0.05)
+            errors += capsys.readouterr().err
+    lines = (errors + capsys.readouterr().err).splitlines()
     assert [line.partition(",")[0] for line in lines] == ["dgcnn", "dgcnn"]
     assert ["3 of 10" in lines[0], "4 of 10" in lines[1]] == [True, True]
     assert all("fold 3" in line and "0.500" in line and "\x1b" not in line for line in lines)

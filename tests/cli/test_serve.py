@@ -37,10 +37,11 @@ def test_service_starts_predicts_and_stops(weights: Path, cloud: np.ndarray) -> 
     try:
         address = process.stdout.readline().split()[3]
         assert address.startswith("http://127.0.0.1:")
-        assert httpx.get(f"{address}/health").json()["ready"] is True
-        assert httpx.post(f"{address}/predict?format=npy", content=npy_bytes(cloud)).status_code == 200
+        assert httpx.get(f"{address}/health", timeout=60).json()["ready"] is True
+        predicted = httpx.post(f"{address}/predict?format=npy", content=npy_bytes(cloud), timeout=60)
+        assert predicted.status_code == 200
         # An idle connection is kept longer than httpx would use it again (5 s), which is Uvicorn's default.
-        kept = http.client.HTTPConnection(address.removeprefix("http://"), timeout=10)
+        kept = http.client.HTTPConnection(address.removeprefix("http://"), timeout=60)
         for idle_s in (0.0, 5.5):
             time.sleep(idle_s)
             kept.request("GET", "/health")
@@ -48,7 +49,7 @@ def test_service_starts_predicts_and_stops(weights: Path, cloud: np.ndarray) -> 
         kept.close()
     finally:
         process.send_signal(signal.SIGTERM)
-        out, err = process.communicate(timeout=10)
+        out, err = process.communicate(timeout=60)
     assert (process.returncode, out) == (0, "")
     assert all(line.startswith("Loading") for line in err.splitlines())
 

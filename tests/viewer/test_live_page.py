@@ -15,7 +15,7 @@ from doorstate.viewer.live_page import LivePage
 
 
 def get(page: LivePage, path: str, **headers: str) -> http.client.HTTPResponse:
-    connection = http.client.HTTPConnection(urlsplit(page.address).netloc, timeout=10)
+    connection = http.client.HTTPConnection(urlsplit(page.address).netloc, timeout=60)
     connection.request("GET", path, headers=headers)
     return connection.getresponse()
 
