@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from doorstate.inference.predictor import DEFAULT_NETWORK
+
 if TYPE_CHECKING:
     from doorstate.evaluation.table import Table
 
@@ -20,31 +22,50 @@ app = typer.Typer(no_args_is_help=True, add_completion=False, rich_markup_mode=N
 
 @app.command()
 def gate(
-    out: Out = Path("docs/benchmarks"), network: Network = "ogurob-pointnet2", count: Count = 100
+    out: Out = Path("docs/benchmarks"),
+    network: Network = "ogurob-pointnet2",
+    count: Count = 100,
+    dark_count: Annotated[int, typer.Option(help="Number of doors with dark leaves.", min=1)] = 180,
 ) -> None:
     """Count clouds that the gate rejects, and closed doors reported open, when parts of the cloud are missing."""
     from doorstate.cli.progress import progress_bar
 
+    from .dark_leaves import dark_table, measure_dark_leaves
     from .gate import gate_table, measure_gate
 
     with progress_bar("gate") as progress:
-        table = gate_table(measure_gate(network, count, progress))
-    _write(table, out / "gate.md", network=network)
+        faults = gate_table(measure_gate(network, count, progress))
+    with progress_bar("dark leaves") as progress:
+        dark = dark_table(measure_dark_leaves(DEFAULT_NETWORK, dark_count, progress))
+    _write((faults, dark), out / "gate.md", network=network, count=count, dark_count=dark_count)
 
 
 @app.command()
-def ghosts(out: Out = Path("docs/benchmarks"), network: Network = "pointnet2", count: Count = 72) -> None:
+def ghosts(
+    out: Out = Path("docs/benchmarks"),
+    network: Network = "pointnet2",
+    count: Count = 48,
+    results: Annotated[Path, typer.Option(help="Results of every door; those in it are kept.")] = Path(
+        "runs/ghosts.csv"
+    ),
+) -> None:
     """Count doors that ghost points turn into another state, with and without removal of outliers, for all methods."""
     from doorstate.cli.progress import progress_bar
 
-    from .ghosts import measure_ghosts, method_table, size_table
+    from .ghost_results import append_results, method_table, read_results, size_table
+    from .ghosts import measure_ghosts
     from .outliers import measure_cost, measure_parts, parts_table
 
+    done = {result.door for result in read_results(results)}
+    doors = [door for door in range(count) if door not in done]
     with progress_bar("ghosts") as progress:
-        results = measure_ghosts(network, count, progress)
+        for number, of_door in enumerate(measure_ghosts(network, doors), 1):
+            append_results(results, of_door)
+            progress(number, len(doors))
+    found = [result for result in read_results(results) if result.door < count]
     with progress_bar("parts") as progress:
         parts = measure_parts(count, progress)
-    tables = (method_table(results), size_table(results, network), parts_table(parts), measure_cost())
+    tables = (method_table(found), size_table(found, network), parts_table(parts), measure_cost())
     _write(tables, out / "ghosts.md", network=network, count=count)
 
 

@@ -49,11 +49,19 @@ def varied_frames(count: int, progress: Progress) -> Iterator[tuple[Row, Frame]]
 
 
 def scene_frames(
-    count: int, sensor: str, progress: Progress, preset: PresetName = "varied"
+    count: int, sensor: str, progress: Progress, preset: PresetName = "varied", first: int = 0
 ) -> Iterator[tuple[Row, Frame]]:
-    """Yield rows and frames of doors in different rooms, in all states, as a sensor measures them."""
-    for number in range(count):
-        progress(number, count)
+    """Yield rows and frames of doors in different rooms, in all states, as a sensor measures them.
+
+    Args:
+        count: number of frames.
+        sensor: name of the sensor model.
+        progress: called before each frame.
+        preset: kind of rooms.
+        first: number of the first frame.
+    """
+    for number in range(first, first + count):
+        progress(number - first, count)
         rows = draw_rows(PRESETS[preset], _SEED, number // 3)
         row = with_sensor(rows[number % 3], sensor)
         yield row, replay(row)

@@ -17,6 +17,7 @@ from doorstate.simulation.frames import Frame, replay
 from doorstate.simulation.row import Row
 from doorstate.types import Part, Points
 
+from .dark_leaves import dark_leaf
 from .frames import reference_frames
 
 Fault = Callable[[Row, Frame, np.random.Generator], Points]
@@ -44,11 +45,6 @@ def glass(row: Row, frame: Frame) -> Points:
     """Return the cloud without the points of the leaf, and without the area that a closed leaf would cover."""
     closed = replay(row.model_copy(update={"opening_angle_deg": 0.0}))
     return without(frame.points, (closed.full.part == Part.LEAF) | (frame.full.part == Part.LEAF))
-
-
-def dark_leaf(row: Row, frame: Frame) -> Points:
-    """Return the cloud without the points of the leaf, as of black and glossy leaves."""
-    return without(frame.points, frame.cut.part == Part.LEAF)
 
 
 def _band(first: float, last: float, axis: int) -> Fault:
@@ -83,7 +79,7 @@ FAULTS: dict[str, Fault] = {
     "lower half missing": _band(0.5, 1.0, 0),
     "nine tenths of the columns missing": _dropout(0.9, columns=True),
     "half of the pixels missing": _dropout(0.5, columns=False),
-    "dark leaf": lambda row, frame, generator: dark_leaf(row, frame),
+    "dark leaf": lambda row, frame, generator: dark_leaf(frame),
     "glass leaf": lambda row, frame, generator: glass(row, frame),
 }
 

@@ -10,6 +10,8 @@ docs/benchmarks/ghosts.md.
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -31,6 +33,8 @@ _MIN_BLOCK_SHARE = 0.03
 _MIN_FLAT_POINTS = 512  # with fewer, neighbours on a surface are as far apart as an outlier
 _MAX_SHARE = 0.5  # with more the points are too far apart for a judgement
 _LEVELS_PER_UNIT = 1000  # of the logarithm of a range, as 16-bit integers
+_TOLERANCE = round(np.log1p(RANGE_TOLERANCE) * _LEVELS_PER_UNIT)
+_MAX_REST = 0.1  # of the pixels; more are quicker all together
 _MISSING = -30000
 
 
@@ -81,38 +85,71 @@ def _range_levels(cloud: Points) -> NDArray[np.int16]:
     """Return the logarithm of each range in thousandths, `_MISSING` where nothing was measured."""
     # Missing points are NaN, infinite or so large that their squares overflow.
     with np.errstate(all="ignore"):
-        x, y, z = (np.asarray(cloud[..., axis], dtype=np.float32) for axis in range(3))
-        squared = x * x
-        squared += y * y
-        squared += z * z
-        levels = np.log(squared, out=squared)
+        squares = np.square(cloud, dtype=np.float32)
+        levels = squares[..., 0] + squares[..., 1]
+        levels += squares[..., 2]
+        np.log(levels, out=levels)
         levels *= np.float32(_LEVELS_PER_UNIT / 2)
-        in_range = np.abs(levels) < -_MISSING / 2
-    return np.where(in_range, levels, np.float32(_MISSING)).astype(np.int16)
+        out_of_range = ~(np.abs(levels) < -_MISSING / 2)
+    np.putmask(levels, out_of_range, np.float32(_MISSING))
+    return levels.astype(np.int16)
 
 
 def _image_outliers(levels: NDArray[np.int16], measured: NDArray[np.bool_]) -> NDArray[np.bool_] | None:
     """Return the outliers of an image; None if its pixels are too sparse."""
     side = max(1, round(BLOB_PX * min(levels.shape) / _BLOB_ROWS))
-    tolerance = round(np.log1p(RANGE_TOLERANCE) * _LEVELS_PER_UNIT)
+    near, far = range(side, side + _REACH_PX // 2), range(side + _REACH_PX // 2, side + _REACH_PX)
     support = np.zeros(levels.shape, np.uint8)
+    _add_support(support, levels, near)
+    if _typical(support, measured) == 4 * len(near):
+        # A dense image: hardly any pixel is left to be compared with those farther away.
+        rest = np.nonzero(measured & (support < _MIN_SUPPORT))
+        if len(rest[0]) < _MAX_REST * support.size:
+            outliers = np.zeros_like(measured)
+            outliers[rest] = support[rest] + _support_of(levels, rest, far) < _MIN_SUPPORT
+            return outliers
+    _add_support(support, levels, far)
+    typical = _typical(support, measured)
+    if typical < _SPARSE_SUPPORT:
+        return None
+    return measured & (support < min(_MIN_SUPPORT, int(_SUPPORT_SHARE * typical)))
+
+
+def _typical(support: NDArray[np.uint8], measured: NDArray[np.bool_]) -> int:
+    """Return the upper quartile of the support of measured pixels."""
+    # A quantile by sorting takes as long as four comparisons of all pixels.
+    sampled = np.bincount(support[::4, ::4][measured[::4, ::4]])
+    return int(np.searchsorted(np.cumsum(sampled), 0.75 * sampled.sum()))
+
+
+def _add_support(support: NDArray[np.uint8], levels: NDArray[np.int16], offsets: Iterable[int]) -> None:
+    """Add the number of pixels at the same range, these offsets away in four directions."""
     # Negative differences become large numbers without a sign: one comparison for both limits.
-    raised = levels + np.int16(tolerance)
-    for offset in range(side, side + _REACH_PX):
+    raised = levels + np.int16(_TOLERANCE)
+    for offset in offsets:
         for first, second in (
             (np.s_[offset:], np.s_[:-offset]),
             (np.s_[:, offset:], np.s_[:, :-offset]),
         ):
             apart = (raised[first] - levels[second]).view(np.uint16)
-            agree = (apart <= 2 * tolerance).view(np.uint8)
+            agree = (apart <= 2 * _TOLERANCE).view(np.uint8)
             support[first] += agree
             support[second] += agree
-    sampled = support[::4, ::4][measured[::4, ::4]]
-    typical = int(np.quantile(sampled, 0.75)) if len(sampled) else 0
-    if typical < _SPARSE_SUPPORT:
-        return None
-    needed = min(_MIN_SUPPORT, int(_SUPPORT_SHARE * typical))
-    return measured & (support < needed)
+
+
+def _support_of(
+    levels: NDArray[np.int16], pixels: tuple[NDArray[np.intp], ...], offsets: Iterable[int]
+) -> NDArray[np.uint8]:
+    """Return the same numbers (K,) for a few pixels, their rows and columns."""
+    own = levels[pixels]
+    support = np.zeros(len(own), np.uint8)
+    for axis, offset in itertools.product((0, 1), (step * sign for step in offsets for sign in (-1, 1))):
+        place = pixels[axis] + offset
+        inside = (place >= 0) & (place < levels.shape[axis])
+        place = np.where(inside, place, 0)
+        other = levels[place, pixels[1]] if axis == 0 else levels[pixels[0], place]
+        support += inside & (np.abs(own - other) <= _TOLERANCE)
+    return support
 
 
 def _flat_outliers(points: Points, measured: NDArray[np.bool_]) -> NDArray[np.bool_]:

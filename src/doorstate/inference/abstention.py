@@ -21,6 +21,7 @@ AbstentionCode = Literal[
     "hole",  # glass or missing data: no free way is visible
     "invalid_outputs",  # of the network: not finite, or no probabilities
     "door_hole",  # a dark or glass leaf, or an open door into nothing
+    "opening_not_seen",  # called open, but the floor behind the opening was not measured
     "no_door",
     "unsure",
     "no_rule_result",
@@ -43,6 +44,10 @@ SENTENCES: dict[AbstentionCode, str] = {
     "door_hole": (
         "a hole like a doorway, {width_m:.1f} m wide and {height_m:.1f} m high, {distance_m:.1f} m away, and no floor "
         "behind it: a dark or glass leaf, or an open door into nothing"
+    ),
+    "opening_not_seen": (
+        "called open, but only {share:.0%} of the rays to the floor behind the opening came back, {min_share:.0%} are "
+        "needed: a dark or glass leaf, or missing data"
     ),
     "no_door": "there seems to be no door: its probability is {probability:.2f}",
     "unsure": "unsure: {state} has probability {probability:.2f}, these weights need {min_probability:.2f}",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Gate before every network and rule: too much missing in a cloud means no state, because a hole is no free way."""
+"""Gate around every network and rule: too much missing in a cloud means no state, because a hole is no free way."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from doorstate.clouds.preparation import MIN_POINTS
 from doorstate.errors import ConfigError
 from doorstate.inference.abstention import Abstention
 from doorstate.inference.holes import find_holes
+from doorstate.inference.seen_through import Opening, seen_share
 from doorstate.types import Points
 
 _SHARES = (
@@ -24,6 +25,7 @@ _SHARES = (
     "max_hole_share",
     "margin_share",
     "max_outlier_share",
+    "min_seen_share",
 )
 _MAX_MARGIN_SHARE = 0.4
 _LARGE_IMAGE_ROWS = 240  # from here on every other row and column is enough
@@ -53,6 +55,8 @@ class Gate:
             that the packaged weights were trained on (3.5 m).
         max_hole_share: largest share of the columns with holes and no such floor; chosen: 0.25 m of a door 3 m away
             with a lens of 60 degrees.
+        min_seen_share: after a network or rule: least share of the rays to the floor behind the opening of an open
+            door that came back; chosen: nearly all simulated open doors have 0.98 or more.
         max_outlier_share: largest share of outliers among the measured points; chosen: recorded frames have up to
             0.063, simulated ones fewer.
         margin_share: columns ignored on each side; chosen: stereo and registered cameras measure nothing in up to a
@@ -74,6 +78,7 @@ class Gate:
     max_hole_share: float = 0.1
     margin_share: float = 0.1
     max_outlier_share: float = 0.1
+    min_seen_share: float = 0.95
 
     def __post_init__(self) -> None:
         # A share out of range would switch its check off silently.
@@ -109,6 +114,19 @@ class Gate:
             self._without_holes,
         )
         return next((abstention for check in checks if (abstention := check(view))), None)
+
+    def check_opening(self, cloud: Points, opening: Opening) -> Abstention | None:
+        """Return the reason why an opening that a network or rule calls open is none, or None if it may be one.
+
+        Args:
+            cloud: as for a call.
+            opening: opening of the door.
+        """
+        view = _View.from_cloud(np.asarray(cloud))
+        share = seen_share(view.cloud, view.measured, opening, self.free_reach_m)
+        if share is None or share >= self.min_seen_share:
+            return None
+        return Abstention("opening_not_seen", {"share": share, "min_share": self.min_seen_share})
 
     def _enough_points(self, view: _View) -> Abstention | None:
         if len(view.points) >= -(-self.min_points // view.pixels_per_reading):
@@ -161,10 +179,11 @@ class Gate:
             free_reach_m=self.free_reach_m,
             margin_share=self.margin_share,
         )
-        if holes.share <= self.max_hole_share:
-            return None
+        # A door seen along its wall is narrow in the view.
         if holes.door is not None:
             return Abstention("door_hole", {**holes.door._asdict(), "share": holes.share})
+        if holes.share <= self.max_hole_share:
+            return None
         return Abstention("hole", {"share": holes.share, "free_reach_m": self.free_reach_m})
 
 

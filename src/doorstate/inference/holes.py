@@ -19,6 +19,7 @@ from doorstate.inference.view_cells import Cells, view_cells
 from doorstate.types import Points
 
 _DOOR_WIDTH_M = (0.5, 2.6)  # of leaves, double ones as well
+_MIN_DOOR_COLUMNS = 3  # one or two lie between a leaf and its jamb
 _MIN_DOOR_HEIGHT_M = 0.6  # black leaves may be measured in their upper half
 _FLANK_COLUMNS = 2  # on each side; a jamb of a few centimetres may be missing
 _MIN_FLANK_SHARE = 0.3  # of the cells beside a hole
@@ -113,6 +114,7 @@ def _door_hole(cells: Cells, runs: _Runs, first: int, last: int) -> DoorHole | N
     width_m = float(np.hypot(*(left - right)[:2])) * count / (count + _FLANK_COLUMNS)
     height_m = float(np.ptp(np.concatenate(flanks)[:, 2]))
     low_m, high_m = _DOOR_WIDTH_M
-    if not (low_m <= width_m <= high_m and height_m >= _MIN_DOOR_HEIGHT_M):
+    is_door = low_m <= width_m <= high_m and height_m >= _MIN_DOOR_HEIGHT_M and count >= _MIN_DOOR_COLUMNS
+    if not is_door:
         return None
     return DoorHole(width_m, height_m, float(np.mean(distances_m)))

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from doorstate._organized import is_image
+from doorstate.clouds.outliers import CleanCloud
 from doorstate.clouds.preparation import MIN_POINTS, CloudSpec, PreparedCloud, prepare_cloud
 from doorstate.clouds.shape import check_single_cloud
 from doorstate.errors import CloudContentError, ConfigError, TooFewPointsError
@@ -139,10 +140,10 @@ class NetworkPredictor(Predictor):
         outputs = iter(run_by_size(self.backend, accepted))
         milliseconds = (self.clock() - started) * 1000 / max(1, len(samples))
         return [
-            decode(next(outputs), self.card.abstain_below, len(points), milliseconds)
+            self._confirm(decode(next(outputs), self.card.abstain_below, len(points), milliseconds), clean)
             if abstention is None
             else Prediction.abstain(abstention, len(points), milliseconds)
-            for points, abstention in samples
+            for points, clean, abstention in samples
         ]
 
     def prepare(self, cloud: Points) -> PreparedCloud:
@@ -178,14 +179,15 @@ class NetworkPredictor(Predictor):
         try:
             points = self._prepare(clean.points, self._spec_of_clean).points
         except TooFewPointsError as error:
-            return _Sample(_NO_POINTS, Abstention.from_error(error))
-        return _Sample(points, self._gate(clean))
+            return _Sample(_NO_POINTS, clean, Abstention.from_error(error))
+        return _Sample(points, clean, self._gate(clean))
 
 
 class _Sample(NamedTuple):
     """Points for the network, and the reason if it must not be run on them."""
 
     points: Points  # (n, 3) in farthest-point order
+    clean: CleanCloud  # that they were sampled from
     abstention: Abstention | None = None
 
 

@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple
 
 from doorstate.inference.abstention import Abstention
+from doorstate.inference.seen_through import Opening
 from doorstate.inference.validity import are_probabilities
 from doorstate.rules.base import Detection
 from doorstate.types import ABSTAINED, STATES, DoorState
@@ -65,6 +67,17 @@ class Prediction:
         return None if self.state is None or self.probabilities is None else self.probabilities[self.state]
 
     @property
+    def opening(self) -> Opening | None:
+        """Ends of the door's opening in plan view; None where the method does not find any."""
+        if self.frame is not None and self.opening_width_m is not None:
+            yaw = math.radians(self.frame.yaw_deg)
+            x_m, y_m = (self.opening_width_m / 2 * part for part in (math.cos(yaw), math.sin(yaw)))
+            frame = self.frame
+            return Opening((frame.x_m + x_m, frame.y_m + y_m), (frame.x_m - x_m, frame.y_m - y_m))
+        outline = next((shape.points_m for shape in self.detections if shape.name == "opening"), None)
+        return None if outline is None else Opening.from_outline(outline)
+
+    @property
     def is_evidence(self) -> bool:
         """True with a state whose probabilities, if any, are valid: programs may make predictions of their own."""
         if self.state is None:
@@ -76,6 +89,20 @@ class Prediction:
     def reason(self) -> str:
         """Sentence of the abstention; empty with a state."""
         return "" if self.abstention is None else str(self.abstention)
+
+    def refuse(self, abstention: Abstention) -> Prediction:
+        """Return the prediction without its state and geometry."""
+        return replace(
+            self,
+            state=None,
+            abstention=abstention,
+            opening_angle_deg=None,
+            hinge=None,
+            hinge_probability=None,
+            frame=None,
+            opening_width_m=None,
+            passable_width_m=None,
+        )
 
     @classmethod
     def abstain(cls, abstention: Abstention, num_points: int = 0, milliseconds: float = 0.0) -> Prediction:

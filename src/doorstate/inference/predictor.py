@@ -14,7 +14,7 @@ from doorstate.errors import ConfigError
 from doorstate.inference.abstention import Abstention
 from doorstate.inference.gate import DEFAULT_GATE, Gate
 from doorstate.inference.prediction import Prediction
-from doorstate.types import Points
+from doorstate.types import DoorState, Points
 
 DEFAULT_NETWORK = "pointnet2"
 
@@ -123,6 +123,14 @@ class Predictor(ABC):
     def _gate(self, clean: CleanCloud) -> Abstention | None:
         """Return the reason why the gate rejects a cloud, or None."""
         return None if self.gate is None else self.gate(clean.points, clean.outlier_share)
+
+    def _confirm(self, prediction: Prediction, clean: CleanCloud) -> Prediction:
+        """Return the prediction, without its state if the gate refuses the opening of an open door."""
+        opening = prediction.opening
+        if self.gate is None or prediction.state is not DoorState.OPEN or opening is None:
+            return prediction
+        abstention = self.gate.check_opening(clean.points, opening)
+        return prediction if abstention is None else prediction.refuse(abstention)
 
     def warm_up(self) -> None:
         """Make the first call as quick as later ones; the process keeps freed memory from then on."""

@@ -72,7 +72,7 @@ class RulePredictor(Predictor):
         if result.state is None:
             abstention = Abstention("no_rule_result", message=result.reason)
             return Prediction(None, num_points, milliseconds, abstention, detections=result.detections)
-        return Prediction(
+        prediction = Prediction(
             state=result.state,
             num_points=num_points,
             milliseconds=milliseconds,
@@ -80,6 +80,7 @@ class RulePredictor(Predictor):
             opening_width_m=result.opening_width_m,
             detections=result.detections,
         )
+        return self._confirm(prediction, clean)
 
 
 def _milliseconds_since(started_s: float) -> float:

@@ -16,9 +16,9 @@ from doorstate.types import DOOR, STATES
 
 _PROGRAM = (
     "before sampling, remove outliers and cut the cloud at max_depth_m of the card; refuse raw clouds as `gate` says. "
-    "The graph makes its "
-    "checks of points behind the camera, range, extent and view on the smallest and largest values of the sampled "
-    "points; the number of points, the measured share, medians, quantiles and holes are left to the program"
+    "The graph makes its checks of points behind the camera, range, extent and view on the smallest and largest values "
+    "of the sampled points; the number of points, the measured share, medians, quantiles, holes and, of open doors, "
+    "the floor behind the opening are left to the program"
 )
 
 

@@ -38,20 +38,26 @@ def add_ghosts(depth_m: DepthImage, ghosts: Ghosts, rng: np.random.Generator) ->
     rows, columns = (rng.integers(0, max(1, size - side + 1), count) for size in (height, width))
     behind = rng.random(count) < {"front": 0.0, "behind": 1.0, "both": 0.5}[ghosts.towards]
     places = rng.random(count)
-    changed = depth_m.copy()
-    for row, column, is_behind, place in zip(
-        rows.tolist(), columns.tolist(), behind.tolist(), places.tolist(), strict=True
-    ):
-        square = np.s_[row : row + side, column : column + side]
-        finite = np.isfinite(depth_m[square])
-        if not finite.any():
-            continue
-        surface = depth_m[square][finite]
-        near, far = (
-            (float(surface.max()) * (1 + _CLEARANCE), ghosts.max_depth_m)
-            if is_behind
-            else (ghosts.min_depth_m, float(surface.min()) * (1 - _CLEARANCE))
+    # (count, side, side) pixels of each square; of overlapping squares, the last is seen.
+    steps = np.arange(side)
+    pixels = tuple(
+        np.minimum(first, size - 1)
+        for first, size in zip(
+            np.broadcast_arrays(rows[:, None, None] + steps[:, None], columns[:, None, None] + steps),
+            depth_m.shape,
+            strict=True,
         )
-        if near < far:
-            changed[square][finite] = np.float32(near + place * (far - near))
+    )
+    surface = depth_m[pixels].astype(np.float64)
+    finite = np.isfinite(surface)
+    farthest = np.where(finite, surface, -np.inf).max(axis=(1, 2))
+    nearest = np.where(finite, surface, np.inf).min(axis=(1, 2))
+    low = np.where(behind, farthest * (1 + _CLEARANCE), ghosts.min_depth_m)
+    high = np.where(behind, ghosts.max_depth_m, nearest * (1 - _CLEARANCE))
+    with np.errstate(invalid="ignore"):
+        ghost_m = low + places * (high - low)
+    changes = finite & (low < high)[:, None, None]
+    changed = depth_m.copy()
+    row, column = (pixel[changes] for pixel in pixels)
+    changed[row, column] = np.broadcast_to(ghost_m[:, None, None], changes.shape)[changes]
     return changed

@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Sight lines through an opening: rays to the floor behind it that came back.
+
+In an open doorway the floor behind the wall is measured, or the leaf that hides it. A black, glossy or glass leaf
+returns nothing, so that most rays to that floor are missing, even where a pane shows the room behind.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from doorstate.types import Points
+
+# Rays cross the middle of the opening, whose edges may be some centimetres wrong, and meet the floor behind it.
+_ACROSS = np.linspace(-0.35, 0.35, 12)  # of the width
+_BEHIND_M = np.arange(0.1, 2.5, 0.1)  # along the ray
+_DEPTH_SPOTS = 9  # the nearest in view of each line: as far as a leaf reaches
+_MIN_REACH_M = 0.5  # behind the opening, however far away it is
+_BEFORE_M = 0.3  # what stands as far before the wall says nothing of the opening
+_NEIGHBOUR, _MAX_GAP = (
+    4,
+    1.5,
+)  # as in view_cells: a ray is missing if its surroundings are denser than it is near
+_MAX_POINTS = 4096  # about the opening
+_MIN_SPOTS = 12
+
+
+class Opening(NamedTuple):
+    """Ends of an opening in plan view, sensor frame."""
+
+    left_m: tuple[float, float]
+    right_m: tuple[float, float]
+
+    @classmethod
+    def from_outline(cls, points_m: NDArray[np.float64]) -> Opening:
+        """Return the outermost places, as the camera sees them, of an outline (K, 2) or (K, 3)."""
+        places = points_m[:, :2]
+        bearing = np.arctan2(places[:, 1], places[:, 0])
+        left, right = places[bearing.argmax()].tolist(), places[bearing.argmin()].tolist()
+        return cls((left[0], left[1]), (right[0], right[1]))
+
+
+def seen_share(cloud: Points, measured: NDArray[np.bool_], opening: Opening, reach_m: float) -> float | None:
+    """Return the share of the rays to the floor behind an opening that came back; None where no floor is in view.
+
+    Args:
+        cloud: (N, 3) or organized (H, W, 3) metres, sensor frame.
+        measured: (N,) or (H, W) points to use.
+        opening: opening in a wall.
+        reach_m: horizontal range up to which floor must be measured.
+    """
+    points = cloud[measured]
+    ahead = points[:, 0] > 0
+    some = points[ahead][:: max(1, len(points) // _MAX_POINTS)]
+    if len(some) <= _NEIGHBOUR:
+        return None
+    spots = _floor_spots(opening, float(np.quantile(some[:, 2], 0.01)), reach_m)
+    rays = spots[..., 1:] / np.maximum(spots[..., :1], 1e-3)
+    low, high = np.quantile(some[:, 1:] / some[:, :1], (0.005, 0.995), axis=0)
+    in_view = (spots[..., 0] > 0) & ((rays >= low) & (rays <= high)).all(axis=-1)
+    in_view &= np.cumsum(in_view, axis=1) <= _DEPTH_SPOTS
+    rays = rays[in_view]
+    if len(rays) < _MIN_SPOTS:
+        return None
+    margin = np.ptp(rays, axis=0).max() / 2
+    near = ahead
+    for axis, (first, last) in enumerate(
+        zip(rays.min(axis=0) - margin, rays.max(axis=0) + margin, strict=True)
+    ):
+        near &= points[:, axis + 1] >= np.float32(first) * points[:, 0]
+        near &= points[:, axis + 1] <= np.float32(last) * points[:, 0]
+    points = points[near]
+    points = points[:: max(1, len(points) // _MAX_POINTS)].astype(np.float64)
+    if len(points) <= _NEIGHBOUR:
+        return 0.0
+    tangents = points[:, 1:] / points[:, :1]
+    tree = cKDTree(tangents)
+    gap, nearest = tree.query(rays)
+    spacing = np.asarray(tree.query(tangents[nearest], [_NEIGHBOUR + 1])[0])[:, 0]
+    is_measured = gap <= _MAX_GAP * spacing
+    before = is_measured & (_behind_m(opening, points[nearest]) < -_BEFORE_M)
+    if (~before).sum() < _MIN_SPOTS:
+        return None
+    return float(is_measured[~before].mean())
+
+
+def _floor_spots(opening: Opening, floor_m: float, reach_m: float) -> NDArray[np.float64]:
+    """Return spots (across, behind, 3) on the floor; NaN where they are out of reach."""
+    middle, along, _ = _axes(opening)
+    crossings = middle + _ACROSS[:, None] * along
+    to_plane_m = np.hypot(*crossings.T)[:, None]
+    to_floor_m = to_plane_m + _BEHIND_M
+    plan = crossings[:, None] * (to_floor_m / np.maximum(to_plane_m, 1e-3))[..., None]
+    spots = np.concatenate([plan, np.full((*plan.shape[:2], 1), floor_m)], axis=-1)
+    spots[to_floor_m > np.maximum(reach_m, to_plane_m + _MIN_REACH_M)] = np.nan
+    return spots
+
+
+def _axes(opening: Opening) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return the middle, the vector between the ends, and the normal away from the camera, in plan view."""
+    left, right = np.asarray(opening.left_m), np.asarray(opening.right_m)
+    along = left - right
+    normal = np.array([along[1], -along[0]]) / max(1e-6, float(np.hypot(*along)))
+    middle = (left + right) / 2
+    return middle, along, normal * (1.0 if normal @ middle >= 0 else -1.0)
+
+
+def _behind_m(opening: Opening, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    middle, _, normal = _axes(opening)
+    behind_m: NDArray[np.float64] = (points[:, :2] - middle) @ normal
+    return behind_m
