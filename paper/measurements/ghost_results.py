@@ -109,8 +109,9 @@ def method_table(results: Sequence[GhostResult]) -> Table:
         tuple(sorted(rows, key=lambda row: row[:3])),
         "Shares of the predictions for closed doors, and for semi-open and open ones (others). *Become open*: number "
         "of predictions *open* for closed doors that are not *open* without ghosts. Half of the doors are without "
-        "noise, half are seen by the sensor `xtion`. Ghosts are squares of 1, 2, 3 and 5 pixels a side, before, behind, and "
-        "on both sides of the surface: all of them for the network, one side for each size and door for rules.",
+        "noise, half are seen by the sensor `xtion`. Ghosts are squares of 1, 2, 3 and 5 pixels a side, before, "
+        "behind, and on both sides of the surface: all of them for the network, one side for each size and "
+        "door for rules.",
         text_columns=4,
     )
 

@@ -11,6 +11,7 @@ import numpy as np
 from doorstate._jobs import no_progress
 from doorstate.clouds.measured import is_measured
 from doorstate.inference.network_predictor import NetworkPredictor
+from doorstate.inference.predictor import Predictor
 from doorstate.inference.reference_clouds import reference_rows
 from doorstate.rules import list_rules
 from doorstate.simulation.frames import Frame, replay
@@ -69,7 +70,10 @@ def measure_ghosts(
         results = []
         for number, ghosts in enumerate(conditions or ghost_conditions()):
             image = with_ghosts(frame, ghosts, np.random.default_rng((door, number)))
-            tasks = [(network, first, "image", image), (network, keeping, "image", image)]
+            tasks: list[tuple[str, Predictor, str, Points]] = [
+                (network, first, "image", image),
+                (network, keeping, "image", image),
+            ]
             if _is_for_rules(ghosts, (number - 1) // len(TOWARDS) + door, is_closed):
                 tasks += [(name, removing[name], "image", image) for name in list_rules()]
                 if is_closed and (ghosts.share, ghosts.side_px) in _FLAT:

@@ -64,18 +64,13 @@ def test_gate_only_removes_states() -> None:
 
 
 def test_dark_leaves_are_never_open() -> None:
-    results = measure_dark_leaves("pointnet2", 15, no_progress)
-    assert len(results) == 15 * 2 * 6
-    assert {result.answer for result in results if result.state == "closed"} <= {
-        "gate",
-        "floor",
-        "abstained",
-        "closed",
-    }
-    assert "open" in {result.answer for result in results if result.state == "open"}
+    results = measure_dark_leaves("pointnet2", 5, no_progress)
+    assert len(results) == 5 * 2 * 6
+    assert "gate" in {result.answer for result in results}
+    assert "open" not in {result.answer for result in results}
     rows = dark_table(results).rows
     assert len(rows) == 2 * 6
-    assert {row[2] for row in rows} == {"5"}
+    assert {(row[2], row[6]) for row in rows} == {("4", "1")}
 
 
 def test_ghosts_open_no_closed_door_once_they_are_removed(tmp_path: Path) -> None:

@@ -109,7 +109,7 @@ def _axes(opening: Opening) -> tuple[NDArray[np.float64], NDArray[np.float64], N
     return middle, along, normal * (1.0 if normal @ middle >= 0 else -1.0)
 
 
-def _behind_m(opening: Opening, points: NDArray[np.float64]) -> NDArray[np.float64]:
+def _behind_m(opening: Opening, points: Points) -> NDArray[np.float64]:
     middle, _, normal = _axes(opening)
     behind_m: NDArray[np.float64] = (points[:, :2] - middle) @ normal
     return behind_m
