@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -25,6 +26,15 @@ def test_rows_clouds_and_labels_have_the_same_order(prepared: Path) -> None:
         np.testing.assert_array_equal(dataset.cloud(index), stored[index])
     assert dataset.parts(0) is None
     assert dataset.image(0) is None
+
+
+def test_a_pipe_in_place_of_the_clouds_is_refused(prepared: Path) -> None:
+    path = prepared / CLOUDS_FILE
+    path.unlink()
+    os.mkfifo(path)
+    with pytest.raises(DatasetError) as caught:
+        open_dataset(prepared)
+    assert caught.value.path == path
 
 
 def test_a_cloud_is_a_copy(prepared: Path) -> None:

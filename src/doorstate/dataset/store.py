@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import Counter
 from functools import cached_property
 from pathlib import Path
-from typing import Literal, TypeVar
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from pydantic import Field, ValidationError
 
 from doorstate._documents import read_json
 from doorstate._files import read_csv, write_text
-from doorstate._input import MAX_SETTINGS_BYTES
+from doorstate._input import MAX_SETTINGS_BYTES, check_input
 from doorstate._models import FrozenModel
 from doorstate.clouds.preparation import MAX_NUM_POINTS, CloudSpec
 from doorstate.dataset.sampling import sample_frame
@@ -240,9 +240,9 @@ def open_dataset(folder: Path) -> PreparedDataset:
     try:
         description = DatasetDescription.model_validate(read_json(path, DatasetError, MAX_SETTINGS_BYTES))
         replayed = description.clouds == "replayed"
-        clouds = None if replayed else np.load(folder / CLOUDS_FILE, mmap_mode="r", allow_pickle=False)
+        clouds = None if replayed else _map(folder / CLOUDS_FILE)
         parts_path = folder / PARTS_FILE
-        parts = np.load(parts_path, mmap_mode="r", allow_pickle=False) if parts_path.is_file() else None
+        parts = _map(parts_path) if parts_path.is_file() else None
     except ValidationError as error:
         raise DatasetError(first_validation_error(error), path=path) from error
     except (OSError, ValueError, EOFError) as error:
@@ -253,6 +253,13 @@ def open_dataset(folder: Path) -> PreparedDataset:
     rows = read_csv(manifest)
     _check(description, rows, clouds, parts, manifest)
     return PreparedDataset(folder, description, rows, clouds, parts)
+
+
+def _map(path: Path) -> NDArray[Any]:
+    if path.exists():  # a pipe would wait for a writer
+        check_input(path, None, DatasetError)
+    array: NDArray[Any] = np.load(path, mmap_mode="r", allow_pickle=False)
+    return array
 
 
 def _check(
