@@ -66,6 +66,7 @@ outcomes += [run(arguments) for arguments in commands[1:]]
 print(json.dumps([outcomes, [hint(call) for call in calls], loaded]))
 """
 COMMANDS = {
+    ("predict", "pcds/closed/cloud.pcd"): None,
     ("predict", "cloud.pcd"): None,
     ("predict", "cloud.pcd", "--rule", "plane_state"): None,
     ("predict", "cloud.npy", "--network", "pointnet2", "--points", "256", "--json"): None,

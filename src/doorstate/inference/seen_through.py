@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from doorstate.types import Points
 
@@ -53,6 +52,8 @@ def seen_share(cloud: Points, measured: NDArray[np.bool_], opening: Opening, rea
         opening: opening in a wall.
         reach_m: horizontal range up to which floor must be measured.
     """
+    from scipy.spatial import cKDTree  # takes longer to import than a closed door to predict
+
     points = cloud[measured]
     ahead = points[:, 0] > 0
     some = points[ahead][:: max(1, len(points) // _MAX_POINTS)]
