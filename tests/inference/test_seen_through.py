@@ -103,6 +103,16 @@ def test_openings_come_from_heads_or_outlines() -> None:
     assert refused.reason
 
 
+def test_a_wall_and_a_leaf_leave_both_sides_of_the_hinge() -> None:
+    wall = np.array([[3.0, 2.0, 0.0], [3.0, 2.0, 2.0], [3.0, -2.0, 2.0], [3.0, -2.0, 0.0]])
+    leaf = np.array([[2.2, 0.4, 0.0], [2.2, 0.4, 2.0], [2.95, 0.4, 2.0], [2.95, 0.4, 0.0]])
+    shapes = (Detection("wall", wall), Detection("leaf", leaf))
+    openings = Prediction(DoorState.OPEN, 1, 0.0, detections=shapes).possible_openings
+    expected = {((3.0, 0.4), (3.0, -0.35)), ((3.0, 1.15), (3.0, 0.4))}
+    assert {tuple(tuple(np.round(end, 6)) for end in found) for found in openings} == expected
+    assert Prediction(DoorState.OPEN, 1, 0.0, detections=shapes[:1]).possible_openings == ()
+
+
 def test_a_glazed_dark_door_is_not_open() -> None:
     """The pane shows the room behind, so that neither the gate nor the network sees a closed door."""
     rows, frames = simulate_rows(PRESETS["varied"], 77, 2, "d435")

@@ -8,6 +8,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from doorstate.inference.abstention import Abstention
 from doorstate.inference.seen_through import Opening
 from doorstate.inference.validity import are_probabilities
@@ -74,8 +77,19 @@ class Prediction:
             x_m, y_m = (self.opening_width_m / 2 * part for part in (math.cos(yaw), math.sin(yaw)))
             frame = self.frame
             return Opening((frame.x_m + x_m, frame.y_m + y_m), (frame.x_m - x_m, frame.y_m - y_m))
-        outline = next((shape.points_m for shape in self.detections if shape.name == "opening"), None)
+        outline = self._outline("opening")
         return None if outline is None else Opening.from_outline(outline)
+
+    @property
+    def possible_openings(self) -> tuple[Opening, ...]:
+        """The opening, or with a wall and a leaf alone both sides of the hinge, each as wide as the leaf."""
+        if self.opening is not None:
+            return (self.opening,)
+        wall, leaf = self._outline("wall"), self._outline("leaf")
+        return () if wall is None or leaf is None else Opening.beside_hinge(wall, leaf)
+
+    def _outline(self, name: str) -> NDArray[np.float64] | None:
+        return next((shape.points_m for shape in self.detections if shape.name == name), None)
 
     @property
     def is_evidence(self) -> bool:

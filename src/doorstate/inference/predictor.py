@@ -126,11 +126,13 @@ class Predictor(ABC):
 
     def _confirm(self, prediction: Prediction, clean: CleanCloud) -> Prediction:
         """Return the prediction, without its state if the gate refuses the opening of an open door."""
-        opening = prediction.opening
-        if self.gate is None or prediction.state is not DoorState.OPEN or opening is None:
+        if self.gate is None or prediction.state is not DoorState.OPEN:
             return prediction
-        abstention = self.gate.check_opening(clean.points, opening)
-        return prediction if abstention is None else prediction.refuse(abstention)
+        for opening in prediction.possible_openings:
+            abstention = self.gate.check_opening(clean.points, opening)
+            if abstention is not None:
+                return prediction.refuse(abstention)
+        return prediction
 
     def warm_up(self) -> None:
         """Make the first call as quick as later ones; the process keeps freed memory from then on."""

@@ -42,6 +42,24 @@ class Opening(NamedTuple):
         left, right = places[bearing.argmax()].tolist(), places[bearing.argmin()].tolist()
         return cls((left[0], left[1]), (right[0], right[1]))
 
+    @classmethod
+    def beside_hinge(cls, wall_m: NDArray[np.float64], leaf_m: NDArray[np.float64]) -> tuple[Opening, ...]:
+        """Return the two stretches of a wall beside the hinge of a leaf, as wide as the leaf.
+
+        Args:
+            wall_m: outline (K, 3) of the wall.
+            leaf_m: outline (K, 3) of the leaf; its hinge is the end nearer to the line of the wall.
+        """
+        start, end = _ends(wall_m)
+        along = (end - start) / max(1e-6, float(np.hypot(*(end - start))))
+        normal = np.array([-along[1], along[0]])
+        leaf = sorted(_ends(leaf_m), key=lambda place: abs(float((place - start) @ normal)))
+        width_m = float(np.hypot(*(leaf[1] - leaf[0])))
+        hinge = start + along * float((leaf[0] - start) @ along)
+        return tuple(
+            cls.from_outline(np.stack([hinge, hinge + side * width_m * along])) for side in (-1.0, 1.0)
+        )
+
 
 def seen_share(cloud: Points, measured: NDArray[np.bool_], opening: Opening, reach_m: float) -> float | None:
     """Return the share of the rays to the floor behind an opening that came back; None where no floor is in view.
@@ -87,6 +105,14 @@ def seen_share(cloud: Points, measured: NDArray[np.bool_], opening: Opening, rea
     if (~before).sum() < _MIN_SPOTS:
         return None
     return float(is_measured[~before].mean())
+
+
+def _ends(outline_m: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the two places of an upright outline in plan view that are farthest apart."""
+    places = outline_m[:, :2]
+    gaps = np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1))
+    first, second = np.unravel_index(gaps.argmax(), gaps.shape)
+    return places[first], places[second]
 
 
 def _floor_spots(opening: Opening, floor_m: float, reach_m: float) -> NDArray[np.float64]:
