@@ -6,6 +6,7 @@ from __future__ import annotations
 import http.client
 import json
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -52,6 +53,32 @@ def test_service_starts_predicts_and_stops(weights: Path, cloud: np.ndarray) -> 
         out, err = process.communicate(timeout=60)
     assert (process.returncode, out) == (0, "")
     assert all(line.startswith("Loading") for line in err.splitlines())
+
+
+def test_stalled_upload_does_not_hold_the_end_of_an_open_service() -> None:
+    process = subprocess.Popen(
+        [
+            COMMAND,
+            *("serve", "--host", "0.0.0.0", "--port", "0", "--rule", "plane_state", "--workers", "1"),
+            *("--timeout-s", "2", "--verbose"),
+        ],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout is not None
+    port = int(process.stdout.readline().split()[3].rpartition(":")[2])
+    with socket.create_connection(("127.0.0.1", port), timeout=60) as stalled:
+        stalled.sendall(b"POST /predict?format=npy HTTP/1.1\r\nHost: localhost\r\nContent-Length: 100\r\n\r\nab")
+        time.sleep(0.3)
+        process.send_signal(signal.SIGTERM)
+        _, err = process.communicate(timeout=60)
+    assert process.returncode == 0
+    assert "Traceback" not in err
+    warning, *lines = [line for line in err.splitlines() if not line.startswith("Loading")]
+    assert "--token" in warning
+    assert lines
+    assert all(re.match(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3} [A-Z]+ ", line) for line in lines)
 
 
 def test_used_port_is_one_line(run: Run, weights: Path) -> None:
