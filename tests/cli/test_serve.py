@@ -69,7 +69,9 @@ def test_stalled_upload_does_not_hold_the_end_of_an_open_service() -> None:
     assert process.stdout is not None
     port = int(process.stdout.readline().split()[3].rpartition(":")[2])
     with socket.create_connection(("127.0.0.1", port), timeout=60) as stalled:
-        stalled.sendall(b"POST /predict?format=npy HTTP/1.1\r\nHost: localhost\r\nContent-Length: 100\r\n\r\nab")
+        stalled.sendall(
+            b"POST /predict?format=npy HTTP/1.1\r\nHost: localhost\r\nContent-Length: 100\r\n\r\nab"
+        )
         time.sleep(0.3)
         process.send_signal(signal.SIGTERM)
         _, err = process.communicate(timeout=60)

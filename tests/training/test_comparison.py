@@ -147,9 +147,18 @@ if __name__ == "__main__":
 
 @pytest.fixture(scope="module")
 def undisturbed(small_dataset: PreparedDataset, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    folder = tmp_path_factory.mktemp("undisturbed") / "c"
-    compare(small_experiment(small_dataset), folder)
-    return read_results(folder)
+    folder = tmp_path_factory.mktemp("undisturbed")
+    subprocess.run(comparison_command(small_dataset, folder, jobs=1), check=True, timeout=300)
+    return read_results(folder / "out")
+
+
+def comparison_command(dataset: PreparedDataset, folder: Path, jobs: int) -> list[str]:
+    """Return the command of a comparison into `out`; it has one thread of its own, whatever this process has."""
+    experiment = write(folder / "experiment.json", small_experiment(dataset).model_dump_json())
+    return [
+        sys.executable,
+        *map(str, (write(folder / "script.py", SCRIPT), experiment, folder / "out", jobs)),
+    ]
 
 
 def wait_for_group(group: int, timeout_s: float) -> None:
@@ -166,24 +175,20 @@ def wait_for_group(group: int, timeout_s: float) -> None:
 def test_killed_comparison_continues_exactly(
     jobs: int, small_dataset: PreparedDataset, undisturbed: dict[str, Any], tmp_path: Path
 ) -> None:
-    settings = small_experiment(small_dataset)
-    write(tmp_path / "experiment.json", settings.model_dump_json())
-    script = write(tmp_path / "script.py", SCRIPT)
-    command = [sys.executable, script, tmp_path / "experiment.json", tmp_path / "killed", str(jobs)]
-
+    command = comparison_command(small_dataset, tmp_path, jobs)
     process = subprocess.Popen(command, start_new_session=True)
     deadline = time.monotonic() + 120
-    while not list((tmp_path / "killed").rglob("checkpoint.pt")):
+    while not list((tmp_path / "out").rglob("checkpoint.pt")):
         assert time.monotonic() < deadline
         assert process.poll() is None
         time.sleep(0.02)
     os.kill(process.pid, signal.SIGKILL)
     process.wait()
     wait_for_group(process.pid, 10.0)  # its workers end too
-    assert len(read_results(tmp_path / "killed")) < 4, "killed after the last run"
+    assert len(read_results(tmp_path / "out")) < 4, "killed after the last run"
 
     subprocess.run(command, check=True, timeout=300)
-    assert read_results(tmp_path / "killed") == undisturbed
+    assert read_results(tmp_path / "out") == undisturbed
     assert len(undisturbed) == 4
 
 
