@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 # a request sent at that moment is lost to a reset.
 KEEP_ALIVE_S = 75
 _MAX_HEAD_BYTES = 16 * 1024
+_SPARE_S = 3
 
 
 def create_server(app: FastAPI, limits: Limits, verbose: bool = False) -> uvicorn.Server:
@@ -41,7 +42,8 @@ def create_server(app: FastAPI, limits: Limits, verbose: bool = False) -> uvicor
             access_log=verbose,
             h11_max_incomplete_event_size=_MAX_HEAD_BYTES,
             timeout_keep_alive=KEEP_ALIVE_S,
-            timeout_graceful_shutdown=math.ceil(limits.timeout_s),
+            # A request ends by its own limit first: Uvicorn would end it with a traceback.
+            timeout_graceful_shutdown=math.ceil(limits.timeout_s) + _SPARE_S,
         )
     )
 
