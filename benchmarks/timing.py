@@ -91,6 +91,18 @@ def resident_mib(process: int | str = "self") -> float:
     return _status_mib("VmRSS", process)
 
 
+def tree_mib(process: int) -> float:
+    """Return the memory of a process and its children; pages that they share count once (PSS, proc(5))."""
+    try:
+        text = Path(f"/proc/{process}/smaps_rollup").read_text(encoding="ascii")
+    except OSError:
+        return 0.0
+    own = next(int(line.split()[1]) / 1024 for line in text.splitlines() if line.startswith("Pss:"))
+    children = Path(f"/proc/{process}/task/{process}/children")
+    numbers = children.read_text(encoding="ascii").split() if children.exists() else []
+    return own + sum(tree_mib(int(number)) for number in numbers)
+
+
 def tree_resident_mib(process: int) -> float:
     """Return the memory of a process and its children; pages that they share count in each."""
     children = Path(f"/proc/{process}/task/{process}/children")

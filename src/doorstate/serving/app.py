@@ -122,7 +122,8 @@ def create_app(queue: WorkQueue, access: Access | None = None) -> FastAPI:
             async with asyncio.timeout(limit_s):
                 upload = await uploads.read(request)
                 problem = "there was no result"
-                job = Job(bytes(upload.content), headers, suffix, options)
+                upload.content = bytes(upload.content)  # one copy of a large file, not two
+                job = Job(upload.content, headers, suffix, options)
                 reply = await queue.run(job, upload.client)
         except TimeoutError as error:
             raise HTTPException(504, f"{problem} after {limit_s:g} s") from error

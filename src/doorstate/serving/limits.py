@@ -40,8 +40,8 @@ class Limits:
     large_text_bytes: int = 256 * 2**10
     head_timeout_s: float = 5.0
     stall_timeout_s: float = 3.0
-    large_uploads: int = 2
-    bytes_in_flight: int = 160 * 2**20
+    large_uploads: int = 1
+    bytes_in_flight: int = 96 * 2**20
     connections: int = 512
     client_connections: int = 128
-    memory_bytes: int | None = 400 * 2**20
+    memory_bytes: int | None = 320 * 2**20

@@ -117,7 +117,7 @@ class Upload:
 
     def __init__(self, client: str) -> None:
         self.client = client
-        self.content = bytearray()
+        self.content: bytes | bytearray = bytearray()
 
 
 class _Upload(Upload):
