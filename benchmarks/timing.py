@@ -91,26 +91,23 @@ def resident_mib(process: int | str = "self") -> float:
     return _status_mib("VmRSS", process)
 
 
-def tree_mib(process: int) -> float:
-    """Return the memory of a process and its children; pages that they share count once (PSS, proc(5))."""
+def process_tree(process: int) -> list[int]:
+    """Return the numbers of a process and of all its children."""
     try:
-        text = Path(f"/proc/{process}/smaps_rollup").read_text(encoding="ascii")
+        children = Path(f"/proc/{process}/task/{process}/children").read_text(encoding="ascii").split()
     except OSError:
-        return 0.0
-    own = next(int(line.split()[1]) / 1024 for line in text.splitlines() if line.startswith("Pss:"))
-    children = Path(f"/proc/{process}/task/{process}/children")
-    numbers = children.read_text(encoding="ascii").split() if children.exists() else []
-    return own + sum(tree_mib(int(number)) for number in numbers)
+        return [process]
+    return [process, *(number for child in children for number in process_tree(int(child)))]
 
 
 def tree_resident_mib(process: int) -> float:
     """Return the memory of a process and its children; pages that they share count in each."""
-    children = Path(f"/proc/{process}/task/{process}/children")
-    try:
-        numbers = children.read_text(encoding="ascii").split()
-    except OSError:
-        numbers = []
-    return resident_mib(process) + sum(tree_resident_mib(int(number)) for number in numbers)
+    return sum(map(resident_mib, process_tree(process)))
+
+
+def tree_shared_once_mib(process: int) -> float:
+    """Return the memory of a process and its children; pages that they share count once (PSS, proc(5))."""
+    return sum(_status_mib("Pss", number, "smaps_rollup") for number in process_tree(process))
 
 
 def peak_resident_mib() -> float:
@@ -125,8 +122,8 @@ def reset_peak() -> None:
         clear_refs.write_text("5")
 
 
-def _status_mib(field: str, process: int | str) -> float:
-    status = Path(f"/proc/{process}/status")
+def _status_mib(field: str, process: int | str, file: str = "status") -> float:
+    status = Path(f"/proc/{process}/{file}")
     lines = status.read_text(encoding="utf-8").splitlines() if status.exists() else []
     kib = [int(line.split()[1]) for line in lines if line.startswith(field + ":")]
     return kib[0] / 1024 if kib else float("nan")

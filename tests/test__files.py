@@ -15,7 +15,7 @@ import pytest
 
 from doorstate._files import atomic_path, check_writable, is_vacant, read_csv, write_csv, write_text
 from doorstate.errors import DatasetError, OutputError
-from tests.attack_files import count_torn, isolation
+from tests.attack.torn_files import count_torn, isolation
 
 
 def test_the_target_appears_when_the_block_ends(tmp_path: Path) -> None:

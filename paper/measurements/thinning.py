@@ -75,11 +75,11 @@ def _results(
         ("all", None),
         *((f, c) for f in ("organized", "flat") for c in CANDIDATES_PER_POINT),
     ]:
-        fewest = None if per_point is None else per_point * predictor.num_points
+        min_points = None if per_point is None else per_point * predictor.num_points
         milliseconds = {}
         for library, sampler in samplers.items():
             started = time.perf_counter()
-            part = _thin(cloud, form, fewest, spec.max_depth_m)
+            part = _thin(cloud, form, min_points, spec.max_depth_m)
             points = prepare_cloud(part, spec, sampler).points
             milliseconds[library] = (time.perf_counter() - started) * 1000
         (outputs,) = run_by_size(predictor.backend, [points])
@@ -90,19 +90,19 @@ def _results(
         )
 
 
-def _thin(cloud: Points, form: str, fewest: int | None, max_depth_m: float | None) -> Points:
-    """Return a part of an organized cloud, as it is or after flattening."""
-    if fewest is None:
+def _thin(cloud: Points, form: str, min_points: int | None, max_depth_m: float | None) -> Points:
+    """Return a part of an organized cloud, organized or flattened."""
+    if min_points is None:
         return cloud
     if form == "organized":
-        rows = thinned_pixels(cloud.shape[0], cloud.shape[1], fewest)
+        rows = thinned_pixels(cloud.shape[0], cloud.shape[1], min_points)
         height = len(np.unique(rows // cloud.shape[1]))
         return cloud.reshape(-1, 3)[rows].reshape(height, -1, 3)
     flat = cloud.reshape(-1, 3)
     flat = flat[is_measured(flat)]
     if max_depth_m is not None:
         flat = flat[flat[:, 0] <= max_depth_m]
-    return flat[thinned_points(flat, fewest)]
+    return flat[thinned_points(flat, min_points)]
 
 
 def thinning_table(results: Sequence[ThinningResult]) -> Table:

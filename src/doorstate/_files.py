@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Atomic writing of files (write beside the target, then rename), and tables of text as CSV.
 
-A file under its final name is whole, whatever is killed and whoever else writes it: temporary names are random, because
-process numbers repeat between containers and threads share one, and the bytes are on the disk before the rename.
+A file under its final name is complete, even if a process is killed or several processes write it: temporary names are
+random, because process numbers repeat between containers and threads share one, and the bytes are on the disk before
+the rename.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ import os
 import socket
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -25,7 +25,7 @@ from doorstate.errors import DoorstateError, FolderInUseError
 _WAIT_S = 2.0  # workers of a killed process end within this time
 _MAX_RECORD_BYTES = 10_000
 _POLL_S = 0.05
-_STALE_S = 60.0  # age of a temporary file that nobody writes
+_STALE_S = 60.0  # age from which a temporary file is abandoned
 
 
 @contextmanager
@@ -33,7 +33,7 @@ def owned_folder(folder: Path, part: str = "") -> Iterator[None]:
     """Own a folder within the block, made if absent; blocks may be nested in one thread.
 
     A folder has one owner, or one owner for each of several parts that write different files. A folder that cannot be
-    written has no owner: nobody can change it.
+    written needs no owner.
 
     Args:
         folder: folder that the block writes.
@@ -50,18 +50,15 @@ def owned_folder(folder: Path, part: str = "") -> Iterator[None]:
     is_new = not folder.exists()
     folder.mkdir(parents=True, exist_ok=True)
     try:
-        with _lock(folder, ""):
-            if not part:
-                _check_parts(folder)
-                _remove_scratch(folder)
-                yield
-                return
-            lock = _lock(folder, f"-{part}")
-            lock.__enter__()
-        try:
+        with ExitStack() as part_lock:
+            with _lock(folder, ""):
+                if not part:
+                    _check_parts(folder)
+                    _remove_scratch(folder)
+                    yield
+                    return
+                part_lock.enter_context(_lock(folder, f"-{part}"))
             yield
-        finally:
-            lock.__exit__(None, None, None)
     finally:
         if is_new:
             with suppress(OSError):  # not empty
@@ -85,7 +82,7 @@ def _lock(folder: Path, suffix: str) -> Iterator[None]:
         yield
     finally:
         if is_outermost:
-            # Removed while held: whoever has opened this file meanwhile finds it unlinked, and opens the next one.
+            # Removed while held: a process that has opened the file meanwhile finds it unlinked, and opens a new one.
             owner.unlink(missing_ok=True)
             path.unlink(missing_ok=True)
         lock.release()

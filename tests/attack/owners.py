@@ -1,13 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Two processes on one folder, with equal process numbers, and threads on one file: no file is torn or mixed."""
+"""Two processes on one folder, with equal process numbers: no file is torn or mixed."""
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from doorstate._files import is_scratch, write_text
+from doorstate._files import is_scratch
 from tests.attack.processes import Command, run
 from tests.attack.samples import POINTS, contents, prepared, simulated
 from tests.attack.tries import Try, Violation, attempt
@@ -60,27 +59,6 @@ def attack_shards(folder: Path, rounds: int) -> Iterator[Try]:
             return "same files as alone"
 
         yield attempt("two shards of `prepare` at once", judge, Violation.TORN)
-
-
-def attack_files(folder: Path, rounds: int) -> Iterator[Try]:
-    """Write one file from several threads while others read it."""
-    target, texts = folder / "a.json", [letter * 100_000 for letter in "abc"]
-    write_text(target, texts[0])
-    for _ in range(rounds):
-        torn: list[int] = []
-        writers = [threading.Thread(target=_write, args=(target, text)) for text in texts]
-        for writer in writers:
-            writer.start()
-        while any(writer.is_alive() for writer in writers):
-            if (text := target.read_text()) not in texts:
-                torn.append(len(text))
-        violation = Violation.TORN if torn or len(list(folder.iterdir())) > 1 else None
-        yield Try("three threads write one file", "torn" if violation else "whole", violation)
-
-
-def _write(target: Path, text: str) -> None:
-    for _ in range(10):
-        write_text(target, text, durable=False)
 
 
 def _results(folder: Path) -> dict[str, bytes]:

@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 from benchmarks.clouds import raw_cloud
-from benchmarks.timing import tree_mib, tree_resident_mib
+from benchmarks.timing import tree_resident_mib, tree_shared_once_mib
 
 from doorstate.io.pcd import write_pcd
 
@@ -146,7 +146,7 @@ def _watch(process: subprocess.Popen[str], port: int, counts: Counts, stop: thre
             connection.close()
             counts.health_s.append(float("inf"))
         counts.memory_mib = max(counts.memory_mib, tree_resident_mib(process.pid))
-        counts.shared_once_mib = max(counts.shared_once_mib, tree_mib(process.pid))
+        counts.shared_once_mib = max(counts.shared_once_mib, tree_shared_once_mib(process.pid))
     connection.close()
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pairs of processes that write one file: `python -m tests.attack_files --pairs 100` counts torn files.
+"""Pairs of processes that write one file.
 
 Both processes of a pair write the same target, in threads too, and a third reads it all the time. Each gets its own
 process number space where the kernel allows it (`unshare`), so that both believe to be process 1, as in containers.
@@ -7,13 +7,13 @@ process number space where the kernel allows it (`unshare`), so that both believ
 
 from __future__ import annotations
 
-import argparse
 import shutil
 import subprocess
 import sys
-import tempfile
-import time
+from collections.abc import Iterator
 from pathlib import Path
+
+from tests.attack.tries import Try, Violation
 
 _WRITE = """
 import sys, threading
@@ -26,6 +26,14 @@ threads = [threading.Thread(target=work, args=(letter,)) for letter in sys.argv[
 [thread.start() for thread in threads]
 [thread.join() for thread in threads]
 """
+
+
+def attack_files(folder: Path, rounds: int) -> Iterator[Try]:
+    """Write one file from two processes of two threads each, while it is read."""
+    isolate = isolation()
+    for _ in range(rounds):
+        violation = Violation.TORN if count_torn(folder / "target.txt", isolate) else None
+        yield Try("two processes write one file", "torn" if violation else "whole", violation)
 
 
 def count_torn(target: Path, isolate: list[str]) -> int:
@@ -48,19 +56,3 @@ def isolation() -> list[str]:
         shutil.which("unshare") and subprocess.run([*command, "true"], capture_output=True).returncode == 0
     )
     return command if allowed else []
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(prog="python -m tests.attack_files", description=__doc__)
-    parser.add_argument("--pairs", type=int, default=100)
-    pairs = parser.parse_args().pairs
-    isolate, started = isolation(), time.monotonic()
-    with tempfile.TemporaryDirectory() as folder:
-        torn = sum(count_torn(Path(folder) / "target.txt", isolate) for _ in range(pairs))
-    where = "as process 1 each" if isolate else "with different process numbers"
-    print(f"{pairs} pairs {where}: {torn} torn files or failures, {time.monotonic() - started:.0f} s")
-    sys.exit(torn != 0)
-
-
-if __name__ == "__main__":
-    main()

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -63,21 +64,15 @@ def places(content: bytes) -> list[int]:
     return [*range(around, around + 90), *np.linspace(8, len(content) - 1, 60, dtype=int).tolist()]
 
 
-def test_a_flipped_bit_of_weights_is_noticed(weights: bytes, tmp_path: Path) -> None:
-    path = tmp_path / "w.safetensors"
-    for place in places(weights):
-        path.write_bytes(flipped(weights, place))
+@pytest.mark.parametrize(("kind", "load"), [("safetensors", load_weights), ("onnx", OnnxBackend)])
+def test_a_flipped_bit_is_noticed(
+    kind: str, load: Callable[[Path], object], weights: bytes, graph: bytes, tmp_path: Path
+) -> None:
+    path, content = tmp_path / f"w.{kind}", {"safetensors": weights, "onnx": graph}[kind]
+    for place in places(content):
+        path.write_bytes(flipped(content, place))
         with pytest.raises(WeightsError) as caught:
-            load_weights(path)
-        assert caught.value.path == path, place
-
-
-def test_a_flipped_bit_of_an_exported_network_is_noticed(graph: bytes, tmp_path: Path) -> None:
-    path = tmp_path / "w.onnx"
-    for place in places(graph):
-        path.write_bytes(flipped(graph, place))
-        with pytest.raises(WeightsError) as caught:
-            OnnxBackend(path)
+            load(path)
         assert caught.value.path == path, place
 
 

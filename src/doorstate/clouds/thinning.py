@@ -11,8 +11,8 @@ import numpy as np
 
 from doorstate.types import Indices, Points
 
-PIXELS_PER_POINT = 16  # an organized cloud is sampled from at least so many
-CELLS_PER_POINT = 8  # and a flat one from at least so many
+PIXELS_PER_POINT = 16  # least number of pixels of an organized cloud for each sampled point
+CELLS_PER_POINT = 8  # least number of occupied cells of a flat cloud for each sampled point
 _BITS = 17  # of each coordinate: 10 m in steps of 0.1 mm; three of them fit exactly into a float64
 _SPREAD = (
     (32, 0x001F00000000FFFF),
@@ -23,24 +23,24 @@ _SPREAD = (
 )
 
 
-def thinned_pixels(height: int, width: int, fewest: int) -> Indices:
-    """Return the rows, in the flattened image, of the pixels in every k-th row and column, at least `fewest`."""
-    step = max(1, int(np.sqrt(height * width / fewest)))
+def thinned_pixels(height: int, width: int, min_points: int) -> Indices:
+    """Return the rows, in the flattened image, of the pixels in every k-th row and column, at least `min_points`."""
+    step = max(1, int(np.sqrt(height * width / min_points)))
     return (np.arange(0, height, step)[:, None] * width + np.arange(0, width, step)).ravel()
 
 
-def thinned_points(points: Points, fewest: int) -> Indices:
+def thinned_points(points: Points, min_points: int) -> Indices:
     """Return the rows, ascending, of one point in each occupied cell of the coarsest grid that leaves enough.
 
-    The grid divides the bounding cube of the cloud, halved along x, y and z in turn until at least `fewest` cells
-    are occupied. A cell keeps its first point on a Z-order curve (Morton 1966), and of points
+    The grid divides the bounding cube of the cloud, halved along x, y and z in turn until at least `min_points`
+    cells are occupied. A cell keeps its first point on a Z-order curve (Morton 1966), and of points
     closer together than 1 / 131,072 of the cube the one with the lowest row.
 
     Args:
         points: (N, 3) metres, finite.
-        fewest: number of points to keep at least; without so many distinct points, all rows are returned.
+        min_points: least number of points to keep; with fewer distinct points, all rows are returned.
     """
-    if len(points) <= fewest:
+    if len(points) <= min_points:
         return np.arange(len(points))
     codes = _morton_codes(points)
     by_code = codes.argsort()
@@ -48,9 +48,9 @@ def thinned_points(points: Points, fewest: int) -> Indices:
     # Neighbours on the curve lie in the same cell of a grid halved b times if their codes share the first b bits.
     shared = 3 * _BITS - np.frexp((codes[1:] ^ codes[:-1]).astype(np.float64))[1]
     cells = 1 + np.cumsum(np.bincount(shared, minlength=3 * _BITS + 1)[: 3 * _BITS])  # of b = 1, 2, ...
-    if cells[-1] < fewest:
+    if cells[-1] < min_points:
         return np.arange(len(points))
-    halvings = 1 + int(np.argmax(cells >= fewest))
+    halvings = 1 + int(np.argmax(cells >= min_points))
     distinct = np.flatnonzero(np.concatenate([[True], shared < 3 * _BITS]))
     starts_cell = np.concatenate([[True], shared < halvings])[distinct]
     return np.sort(np.minimum.reduceat(by_code, distinct)[starts_cell])

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from doorstate.inference.view_cells import NEIGHBOUR, nearest_measured
 from doorstate.types import Points
 
 # Rays cross the middle of the opening, whose edges may be some centimetres wrong, and meet the floor behind it.
@@ -20,10 +21,7 @@ _BEHIND_M = np.arange(0.1, 2.5, 0.1)  # along the ray
 _DEPTH_SPOTS = 9  # the nearest in view of each line: as far as a leaf reaches
 _MIN_REACH_M = 0.5  # behind the opening, however far away it is
 _BEFORE_M = 0.3  # what stands as far before the wall says nothing of the opening
-_NEIGHBOUR, _MAX_GAP = (
-    4,
-    1.5,
-)  # as in view_cells: a ray is missing if its surroundings are denser than it is near
+_MAX_GAP = 1.5  # of view_cells.nearest_measured
 _MAX_POINTS = 4096  # about the opening
 _MIN_SPOTS = 12
 
@@ -70,12 +68,10 @@ def seen_share(cloud: Points, measured: NDArray[np.bool_], opening: Opening, rea
         opening: opening in a wall.
         reach_m: horizontal range up to which floor must be measured.
     """
-    from scipy.spatial import cKDTree  # takes longer to import than a closed door to predict
-
     points = cloud[measured]
     ahead = points[:, 0] > 0
     some = points[ahead][:: max(1, len(points) // _MAX_POINTS)]
-    if len(some) <= _NEIGHBOUR:
+    if len(some) <= NEIGHBOUR:
         return None
     spots = _floor_spots(opening, float(np.quantile(some[:, 2], 0.01)), reach_m)
     rays = spots[..., 1:] / np.maximum(spots[..., :1], 1e-3)
@@ -94,13 +90,10 @@ def seen_share(cloud: Points, measured: NDArray[np.bool_], opening: Opening, rea
         near &= points[:, axis + 1] <= np.float32(last) * points[:, 0]
     points = points[near]
     points = points[:: max(1, len(points) // _MAX_POINTS)].astype(np.float64)
-    if len(points) <= _NEIGHBOUR:
+    if len(points) <= NEIGHBOUR:
         return 0.0
     tangents = points[:, 1:] / points[:, :1]
-    tree = cKDTree(tangents)
-    gap, nearest = tree.query(rays)
-    spacing = np.asarray(tree.query(tangents[nearest], [_NEIGHBOUR + 1])[0])[:, 0]
-    is_measured = gap <= _MAX_GAP * spacing
+    is_measured, nearest = nearest_measured(tangents, rays, _MAX_GAP)
     before = is_measured & (_behind_m(opening, points[nearest]) < -_BEFORE_M)
     if (~before).sum() < _MIN_SPOTS:
         return None

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ _MIN_GRID_SHARE = 1 / 16
 _SPARSE_ROWS, _SPARSE_COLUMNS = 30, 40
 # A cell is empty if its nearest point is farther away than this many times the distance from that point to its own
 # fourth neighbour: one in 1000 cells of a surface with points at random.
-_NEIGHBOUR, _MAX_GAP = 4, 1.3
+NEIGHBOUR, _MAX_GAP = 4, 1.3
 # Flat clouds are evaluated within 45 degrees of straight ahead: no depth camera sees more.
 _MAX_TANGENT = 1.0
 
@@ -80,7 +80,7 @@ def _ray_cells(points: Points) -> Cells | None:
     tangents = -ahead[:, 1:] / ahead[:, :1]  # (N, 2) right, down
     near = (np.abs(tangents) <= _MAX_TANGENT).all(axis=1)
     ahead, tangents = ahead[near], tangents[near]
-    if len(ahead) <= _NEIGHBOUR:
+    if len(ahead) <= NEIGHBOUR:
         return None
     low, high = np.quantile(tangents, (0.005, 0.995), axis=0)
     size = np.maximum(high - low, 1e-6)
@@ -108,13 +108,30 @@ def _sparse_cells(points: NDArray[np.float64], places: NDArray[np.float64]) -> C
         points: (N, 3) metres.
         places: (N, 2) place in the view, 0 to 1 to the right and down.
     """
-    from scipy.spatial import cKDTree  # takes longer to import than an image of points to predict
-
-    tree = cKDTree(places)
-    spacing = np.asarray(tree.query(places, [_NEIGHBOUR + 1])[0])[:, 0]
     across = (np.arange(_SPARSE_COLUMNS) + 0.5) / _SPARSE_COLUMNS
     down = (np.arange(_SPARSE_ROWS) + 0.5) / _SPARSE_ROWS
     centres = np.stack(np.meshgrid(across, down), axis=-1)  # (rows, columns, 2)
-    gap, nearest = tree.query(centres)
+    filled, nearest = nearest_measured(places, centres, _MAX_GAP)
     points_m = points[nearest]
-    return Cells(gap <= _MAX_GAP * spacing[nearest], np.hypot(points_m[..., 0], points_m[..., 1]), points_m)
+    return Cells(filled, np.hypot(points_m[..., 0], points_m[..., 1]), points_m)
+
+
+def nearest_measured(
+    places: NDArray[np.floating[Any]], queries: NDArray[np.float64], max_gap: float
+) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
+    """Return which queries lie among the places, and the nearest place of each.
+
+    A query lies among them if its nearest place is no farther away than `max_gap` times the distance from that place to
+    its own fourth neighbour.
+
+    Args:
+        places: (N, 2) places in the view, more than `NEIGHBOUR`.
+        queries: (..., 2) places to judge.
+        max_gap: factor of the distance.
+    """
+    from scipy.spatial import cKDTree  # takes longer to import than an image of points to predict
+
+    tree = cKDTree(places)
+    gap, nearest = tree.query(queries)
+    spacing = np.asarray(tree.query(places[nearest], [NEIGHBOUR + 1])[0])[..., 0]
+    return gap <= max_gap * spacing, np.asarray(nearest)

@@ -78,7 +78,7 @@ def parse_distortion(model: str, coefficients: Sequence[float]) -> Distortion | 
     """Return the distortion of a camera; None if all coefficients are 0.
 
     Args:
-        model: a name that ROS, Kalibr, OpenCV or RealSense give it; empty: that of OpenCV with so many coefficients.
+        model: name in ROS, Kalibr, OpenCV or RealSense; empty: that of OpenCV with this number of coefficients.
         coefficients: as stored; missing ones are 0.
 
     Raises:

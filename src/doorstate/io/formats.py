@@ -80,7 +80,7 @@ def conversion_hint(suffix: str) -> str | None:
 
 
 def unpack_gzip(data: bytes) -> bytes:
-    """Return the content of gzip data, and any other data as it is.
+    """Return the content of gzip data, and other data unchanged.
 
     Raises:
         CloudReadError: damaged, or larger than one camera frame.
@@ -91,7 +91,7 @@ def unpack_gzip(data: bytes) -> bytes:
 
 
 def unpack_at_most(data: bytes, max_bytes: int) -> bytes:
-    """Return the first bytes of the content of gzip data, and any other data as it is.
+    """Return the first bytes of the content of gzip data, and of other data unchanged.
 
     Raises:
         CloudReadError: damaged.

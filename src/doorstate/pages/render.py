@@ -20,6 +20,12 @@ def render_page(template: str, package: str, **values: Any) -> str:
         package: package of the template.
         values: variables of the template; colours and view are added to `page_data`.
     """
+    additions = {"page_data": values["page_data"] | page_style(), "policy": POLICY_MARK}
+    return with_policy(fill_template(template, package, **values | additions), live=False)
+
+
+def fill_template(template: str, package: str, **values: Any) -> str:
+    """Fill a template of a package; arguments as in `render_page`, without additions."""
     environment = Environment(
         loader=ChoiceLoader([PackageLoader(name) for name in (package, "doorstate.pages")]),
         autoescape=True,
@@ -27,7 +33,4 @@ def render_page(template: str, package: str, **values: Any) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    page = environment.get_template(template).render(
-        **values | {"page_data": values["page_data"] | page_style()}, policy=POLICY_MARK
-    )
-    return with_policy(page, live=False)
+    return environment.get_template(template).render(**values)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Middleware that checks who asks, and tells browsers what they may do with a response."""
+"""Middleware for permissions of clients and security headers."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _HEADERS = {
 
 @dataclass(frozen=True)
 class Access:
-    """Who may use the service.
+    """Permissions of clients.
 
     Args:
         hosts: names in the Host header, besides addresses, localhost and the name of this machine. A web page whose

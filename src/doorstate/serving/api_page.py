@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from doorstate.pages.render import fill_template
 
 
 def render_api_page(description: Mapping[str, Any]) -> str:
@@ -15,13 +15,6 @@ def render_api_page(description: Mapping[str, Any]) -> str:
     Args:
         description: OpenAPI description of the service.
     """
-    environment = Environment(
-        loader=PackageLoader("doorstate.serving"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
     operations = [
         {
             "method": method.upper(),
@@ -37,8 +30,12 @@ def render_api_page(description: Mapping[str, Any]) -> str:
         name: {field: _field(values) for field, values in schema.get("properties", {}).items()}
         for name, schema in description["components"]["schemas"].items()
     }
-    return environment.get_template("api.html.j2").render(
-        info=description["info"], operations=operations, schemas=schemas
+    return fill_template(
+        "api.html.j2",
+        "doorstate.serving",
+        info=description["info"],
+        operations=operations,
+        schemas=schemas,
     )
 
 

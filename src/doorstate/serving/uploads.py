@@ -25,7 +25,7 @@ class Uploads:
 
     def __init__(self, limits: Limits) -> None:
         self._limits = limits
-        self._open: dict[_Upload, None] = {}
+        self._open: set[Upload] = set()
         self._large = asyncio.Semaphore(limits.large_uploads)
         self._client_bytes: Counter[str] = Counter()
         self.total_bytes = 0
@@ -39,26 +39,30 @@ class Uploads:
             ClientDisconnect: the client closed the connection.
         """
         declared = _declared(request, self._limits.max_bytes)
-        upload = _Upload(request.client.host if request.client else "", self._limits.stall_timeout_s)
-        self._open[upload] = None
+        upload = Upload(request.client.host if request.client else "", self._limits.stall_timeout_s)
+        self._open.add(upload)
         try:
             async with AsyncExitStack() as stack:
                 if declared >= self._limits.large_bytes:
                     await self._wait_for_place(stack)
-                upload.deadline = await stack.enter_async_context(asyncio.timeout(upload.patience_s))
-                async for chunk in request.stream():
-                    self._add(upload, chunk)
-                    if upload.is_large(self._limits.large_bytes) and declared < self._limits.large_bytes:
-                        raise HTTPException(411, "a large file needs a Content-Length")
-        except TimeoutError as error:
-            self.release(upload)
-            raise HTTPException(408, f"no part of the file arrived for {upload.patience_s:g} s") from error
+                await self._receive(request, upload, declared)
         except BaseException:
             self.release(upload)
             raise
         finally:
-            del self._open[upload]
+            self._open.remove(upload)
         return upload
+
+    async def _receive(self, request: Request, upload: Upload, declared: int) -> None:
+        large = self._limits.large_bytes
+        try:
+            async with asyncio.timeout(upload.patience_s) as upload.deadline:
+                async for chunk in request.stream():
+                    self._add(upload, chunk)
+                    if declared < large <= len(upload.content):
+                        raise HTTPException(411, "a large file needs a Content-Length")
+        except TimeoutError as error:
+            raise HTTPException(408, f"no part of the file arrived for {upload.patience_s:g} s") from error
 
     async def _wait_for_place(self, stack: AsyncExitStack) -> None:
         """Take one of the places of large uploads until the stack is closed; meanwhile nothing of it is received."""
@@ -73,7 +77,7 @@ class Uploads:
         self._count(upload, -len(upload.content))
         upload.content = bytearray()
 
-    def _add(self, upload: _Upload, chunk: bytes) -> None:
+    def _add(self, upload: Upload, chunk: bytes) -> None:
         if len(upload.content) + len(chunk) > self._limits.max_bytes:
             raise _too_large(self._limits.max_bytes)
         while self._is_full(upload, len(chunk)):
@@ -83,20 +87,20 @@ class Uploads:
         self._count(upload, len(chunk))
         upload.progress()
 
-    def _is_full(self, upload: _Upload, size: int) -> bool:
+    def _is_full(self, upload: Upload, size: int) -> bool:
         # Half of the bytes are kept for other clients.
         of_client = self._client_bytes[upload.client] + size
         alone = len(self._client_bytes) == 1
         limit = self._limits.bytes_in_flight
         return self.total_bytes + size > limit or (not alone and of_client > max(limit // 2, size))
 
-    def _end_idle(self, newcomer: _Upload) -> bool:
-        """End the upload that has been idle for the longest time; return false if there is none."""
-        now = asyncio.get_running_loop().time()
+    def _end_idle(self, newcomer: Upload) -> bool:
+        """End the upload that has been idle for the longest time; return False if there is none."""
+        now_s = _now_s()
         idle = [
             upload
             for upload in self._open
-            if upload is not newcomer and upload.content and now - upload.last_s > _IDLE_S
+            if upload is not newcomer and upload.content and now_s - upload.last_s > _IDLE_S
         ]
         if not idle:
             return False
@@ -113,33 +117,34 @@ class Uploads:
 
 
 class Upload:
-    """Content of a request."""
+    """Content of a request, and the time of its last part.
 
-    def __init__(self, client: str) -> None:
-        self.client = client
-        self.content: bytes | bytearray = bytearray()
-
-
-class _Upload(Upload):
-    """Upload in progress, and the time of its last part."""
+    Args:
+        client: address of the client.
+        patience_s: longest time between two parts.
+    """
 
     def __init__(self, client: str, patience_s: float) -> None:
-        super().__init__(client)
+        self.client = client
         self.patience_s = patience_s
+        self.content: bytes | bytearray = bytearray()
         self.deadline: asyncio.Timeout | None = None
-        self.last_s = asyncio.get_running_loop().time()
+        self.last_s = _now_s()
 
     def progress(self) -> None:
-        self.last_s = asyncio.get_running_loop().time()
+        """Start the time until the next part."""
+        self.last_s = _now_s()
         if self.deadline is not None:
             self.deadline.reschedule(self.last_s + self.patience_s)
 
-    def is_large(self, size: int) -> bool:
-        return len(self.content) >= size
-
     def end(self) -> None:
+        """Let the upload time out now."""
         if self.deadline is not None and not self.deadline.expired():
-            self.deadline.reschedule(asyncio.get_running_loop().time())
+            self.deadline.reschedule(_now_s())
+
+
+def _now_s() -> float:
+    return asyncio.get_running_loop().time()
 
 
 def _declared(request: Request, limit: int) -> int:

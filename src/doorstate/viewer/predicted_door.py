@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -33,13 +32,11 @@ def predicted_door(prediction: Prediction, floor_z_m: float) -> list[Line]:
         prediction: a prediction; without a frame and a width there is nothing to draw.
         floor_z_m: height of the floor in the sensor frame.
     """
-    frame, width_m = prediction.frame, prediction.opening_width_m
-    if frame is None or width_m is None:
+    opening, width_m = prediction.opening, prediction.opening_width_m
+    if prediction.frame is None or opening is None or not width_m:
         return []
-    yaw = math.radians(frame.yaw_deg)
-    along = np.array([math.cos(yaw), math.sin(yaw)])  # along the wall, to its left
-    middle = np.array([frame.x_m, frame.y_m])
-    left, right = middle + along * width_m / 2, middle - along * width_m / 2
+    left, right = np.array(opening.left_m), np.array(opening.right_m)
+    along = (left - right) / width_m  # along the wall, to its left
     door = [Line("door frame", _upright(left, right, floor_z_m))]
     if prediction.hinge is None:
         return door

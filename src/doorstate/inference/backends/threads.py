@@ -32,6 +32,6 @@ def configure_torch(threads: int | None, *, used: bool) -> None:
         return
     try:
         import torch
-    except ImportError:  # whoever loads the network says so
+    except ImportError:  # loading the network reports it
         return
     torch.set_num_threads(threads or default_threads())

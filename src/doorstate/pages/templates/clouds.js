@@ -310,5 +310,5 @@ const clouds = (() => {
     }
   }
 
-  return { data, decode, channelsOf, byHeight, byPart, byChannels, heights, heightRange, quantile, detectionColor, detectionLines, axes, view, previews };
+  return { data, decode, channelsOf, byHeight, byPart, byChannels, heights, quantile, detectionLines, view, previews };
 })();
