@@ -147,8 +147,7 @@ def _predict(
 
     for method, predictor in predictors.items():
         prediction = require_points(predictor(cloud.points))
-        record = prediction_to_dict(prediction, format_flag)
-        yield row | {"method": method} | record | {"sensor_pose": cloud.pose.to_dict()}
+        yield row | {"method": method} | prediction_to_dict(prediction, format_flag, cloud.pose)
 
 
 def _name(path: Path) -> str:

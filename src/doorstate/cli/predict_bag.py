@@ -57,9 +57,8 @@ def _predict_messages(predictors: Mapping[str, Predictor], clouds: Iterable[Stam
             try:
                 if isinstance(cloud, DoorstateError):
                     raise cloud
-                poses = {} if pose is None else {"sensor_pose": pose.to_dict()}
                 yield [
-                    row | {"method": method} | prediction_to_dict(predictor(cloud), format_flag) | poses
+                    row | {"method": method} | prediction_to_dict(predictor(cloud), format_flag, pose)
                     for method, predictor in predictors.items()
                 ]
             except DoorstateError as error:

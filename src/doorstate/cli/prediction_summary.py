@@ -17,7 +17,7 @@ class PredictionSummary:
     """Counts predictions and failures.
 
     Args:
-        noun: what is predicted on, such as "file".
+        noun: noun of a cloud, such as "file".
 
     Attributes:
         clouds: number of clouds so far.
@@ -59,7 +59,7 @@ class PredictionSummary:
         """Print a line for each method on standard output.
 
         Args:
-            end: what to say after the counts.
+            end: text after the counts.
         """
         failed = f"; no prediction for {self.failures}" if self.failures else ""
         for method, states in self._states.items():
@@ -80,7 +80,7 @@ def print_errors(errors: Sequence[tuple[str, str]], noun: str) -> None:
 
     Args:
         errors: name and error of each thing that failed.
-        noun: what they are, such as "file".
+        noun: their noun, such as "file".
     """
     kinds: dict[str, list[tuple[str, str]]] = {}
     for name, error in errors:

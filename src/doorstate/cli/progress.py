@@ -33,7 +33,7 @@ def progress_bar(description: str, *, hidden: bool = False) -> Iterator[Update]:
     A terminal gets a bar. Otherwise a line is printed after 2, 4, 8, ... seconds, and then every minute.
 
     Args:
-        description: what is done, such as "Simulating".
+        description: present participle of the work, such as "Simulating".
         hidden: show nothing.
     """
     if hidden:
@@ -62,7 +62,7 @@ def line_progress(description: str, clock: Callable[[], float] = time.monotonic)
     """Return an update that prints a line now and then, and none for work of two seconds.
 
     Args:
-        description: what is done.
+        description: present participle of the work.
         clock: seconds.
     """
     started, due_s = clock(), FIRST_LINE_S

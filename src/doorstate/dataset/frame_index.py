@@ -27,9 +27,7 @@ from doorstate.io.rotations import parse_quaternion
 _NUMBERS = {"depth_unit_m": "depth_scale_m", "roll_deg": "roll_deg", "pitch_deg": "pitch_deg"}
 _CAMERA = ("fx", "fy", "cx", "cy")
 _UNKNOWN = ("", "?")
-_LEVELS = (
-    3  # folders above a file in which its index is looked for: below them are Depth/Test/Closed and the like
-)
+_LEVELS = 3  # folders above a file that may hold its index, as in Depth/Test/Closed
 
 
 def read_index(folder: Path, options: ReadOptions) -> list[tuple[dict[str, str], ReadOptions]]:

@@ -10,10 +10,13 @@ from doorstate.errors import TooFewPointsError, WriteParameter, python_parameter
 
 if TYPE_CHECKING:
     from doorstate.inference.prediction import Prediction
+    from doorstate.io.sensor_pose import SensorPose
 
 
 def prediction_to_dict(
-    prediction: Prediction, parameter: WriteParameter = python_parameter
+    prediction: Prediction,
+    parameter: WriteParameter = python_parameter,
+    pose: SensorPose | None = None,
 ) -> dict[str, Any]:
     """Return a prediction as JSON values; fields without a value are left out.
 
@@ -22,6 +25,7 @@ def prediction_to_dict(
     Args:
         prediction: prediction of a network or a rule.
         parameter: writes a parameter that a reason suggests as the surface spells it.
+        pose: pose of the camera that was applied to the points, as the field `sensor_pose`.
     """
     record: dict[str, Any] = {"state": None if prediction.state is None else str(prediction.state)}
     if prediction.raw_probabilities is not None:
@@ -31,7 +35,8 @@ def prediction_to_dict(
     if prediction.abstention is not None:
         record["reason"] = prediction.abstention.describe(parameter)
     values = {name: value(prediction) for name, value in OPTIONAL_FIELDS.items()}
-    return record | {name: value for name, value in values.items() if value is not None}
+    record |= {name: value for name, value in values.items() if value is not None}
+    return record if pose is None else record | {"sensor_pose": pose.to_dict()}
 
 
 def require_points(prediction: Prediction) -> Prediction:

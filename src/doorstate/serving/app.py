@@ -52,7 +52,7 @@ def create_app(queue: WorkQueue, access: Access | None = None) -> FastAPI:
 
     Args:
         queue: workers that predict the files.
-        access: who may use the service; None admits everybody who reaches it by an address or a name of this machine.
+        access: permissions of clients; None admits all that name this machine or an address.
     """
     method = queue.wait_until_ready()
     uploads, metrics = Uploads(queue.limits), Metrics()

@@ -199,7 +199,7 @@ def predict_file(predictor: Predictor, job: Job, max_bytes: int) -> Reply:
         file = read_body(job.content, job.headers, max_bytes)
         cloud, pose = parse_posed_cloud(file.content, job.suffix or file.suffix, job.options)
         prediction = require_points(predictor(cloud))
-        record = prediction_to_dict(prediction, format_parameter) | {"sensor_pose": pose.to_dict()}
+        record = prediction_to_dict(prediction, format_parameter, pose)
         is_faulty = prediction.abstention is not None and prediction.abstention.code == "invalid_outputs"
         return Reply(200, record, prediction.reason if is_faulty else "")
     except HTTPException as error:

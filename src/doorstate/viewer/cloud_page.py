@@ -58,10 +58,9 @@ def make_entry(
         entry["channels"] = encode_bytes(steps.tobytes())
     parts = None if named.parts is None else named.parts[prepared.indices[:NUM_POINTS]]
     whole = thin_for_display(named.cloud)
-    pose = {} if named.pose is None else {"sensor_pose": named.pose.to_dict()}
     floor_z_m = float(np.quantile(whole[:, 2], _FLOOR_SHARE))
     return entry | {
-        "prediction": prediction_to_dict(prediction, parameter) | pose,
+        "prediction": prediction_to_dict(prediction, parameter, named.pose),
         "cloud": encode_cloud(prepared.points[:NUM_POINTS], parts),
         "whole": encode_cloud(whole),
         "floor_z_m": round(floor_z_m, 3),
