@@ -178,4 +178,4 @@ def test_an_extra_brings_all_that_its_feature_imports(extra: str, module: str, f
 
 def test_a_network_answers_without_what_only_rules_need(outcomes: Outcomes) -> None:
     assert "onnxruntime" in outcomes.loaded
-    assert not {"scipy", "doorstate.rules.planes", "doorstate.simulation"} & outcomes.loaded
+    assert not {"scipy", "doorstate.doorways.planes", "doorstate.simulation"} & outcomes.loaded

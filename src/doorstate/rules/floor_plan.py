@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from doorstate.rules.plan_lines import Flags, Floats, Line, strongest_line
-from doorstate.rules.planes import grid
+from doorstate.doorways.plan_lines import Flags, Floats, Line, strongest_line
+from doorstate.doorways.planes import grid
 
 _LEVEL_M = 0.1  # heights are measured or not in steps of this
 _MAX_LINES = 5

@@ -19,8 +19,8 @@ from pydantic import Field
 
 from doorstate.rules.base import Detection, Parameters, Rule, RuleResult, measured_points
 from doorstate.rules.floor_plan import FloorPlan, azimuth_rad, floor_plan, strongest_lines
-from doorstate.rules.plan_lines import Floats, Line, fit_line
-from doorstate.rules.planes import voxel_downsample
+from doorstate.doorways.plan_lines import Floats, Line, fit_line
+from doorstate.doorways.planes import voxel_downsample
 from doorstate.rules.wall_columns import Gap, WallColumns, wall_columns
 from doorstate.types import DoorState, Points
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from doorstate.rules.plan_lines import Flags, Floats, strongest_line
+from doorstate.doorways.plan_lines import Flags, Floats, strongest_line
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from doorstate.rules.plan_lines import Line, fit_line, strongest_line
+from doorstate.doorways.plan_lines import Line, fit_line, strongest_line
 
 DIAGONAL = Line(np.array([2.0, 0.0]), np.array([0.6, 0.8]))
 
