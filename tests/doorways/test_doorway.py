@@ -37,14 +37,12 @@ def test_a_wall_ahead_has_its_robot_side_towards_the_camera() -> None:
 def test_the_frame_is_the_door_frame_of_the_simulator() -> None:
     rows, _ = simulate_rows(PRESETS["varied"], seed=3, index=0)
     row = rows[0]
-    assert row.door_x_m is not None and row.door_y_m is not None and row.door_yaw_deg is not None
-    assert row.opening_width_m is not None
+    pose = row.door_x_m, row.door_y_m, row.door_yaw_deg, row.opening_width_m
+    x_m, y_m, yaw_deg, width_m = (value for value in pose if value is not None)
     frame = replay(row)
-    doorway = Doorway(
-        row.door_x_m, row.door_y_m, row.door_yaw_deg, row.opening_width_m, -row.camera_height_m
-    )
+    doorway = Doorway(x_m, y_m, yaw_deg, width_m, -row.camera_height_m)
     points = doorway.to_doorway(frame.points)
     floor = points[frame.cut.part == Part.FLOOR]
     leaf = points[frame.cut.part == Part.LEAF]
     assert floor[:, 2] == pytest.approx(0, abs=2e-3)
-    assert np.abs(np.median(leaf[:, 0])) < row.opening_width_m / 2
+    assert np.abs(np.median(leaf[:, 0])) < width_m / 2

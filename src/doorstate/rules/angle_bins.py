@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from doorstate.rules.base import Parameters, Rule, RuleResult, state_by_angle
 from doorstate.doorways.plan_lines import Floats, angle_deg
 from doorstate.doorways.planes import Plane, component_numbers, upright_plane, voxel_downsample
+from doorstate.rules.base import Parameters, Rule, RuleResult, state_by_angle
 from doorstate.rules.walls import (
     WallParameters,
     above_floor,

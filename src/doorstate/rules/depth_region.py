@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from doorstate.rules.base import Detection, Parameters, Rule, RuleResult
 from doorstate.doorways.planes import voxel_downsample
+from doorstate.rules.base import Detection, Parameters, Rule, RuleResult
 from doorstate.rules.walls import nearby_points
 from doorstate.types import DoorState, Points
 

@@ -18,9 +18,9 @@ from pydantic import Field
 from scipy.spatial import cKDTree
 
 from doorstate.clouds.measured import is_measured
-from doorstate.rules.base import Detection, Parameters, Rule, RuleResult
 from doorstate.doorways.plan_lines import Flags, Floats, Line, strongest_line
 from doorstate.doorways.planes import voxel_downsample
+from doorstate.rules.base import Detection, Parameters, Rule, RuleResult
 from doorstate.types import DoorState, Indices, Points
 
 _MAX_BREAKS = 4  # of a row in one opening; more are a cluttered room

@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from doorstate.rules.base import Parameters, Rule, RuleResult, state_by_angle
 from doorstate.doorways.plan_lines import Floats, angle_deg
 from doorstate.doorways.planes import Plane, component_numbers, normals, upright_plane, voxel_downsample
+from doorstate.rules.base import Parameters, Rule, RuleResult, state_by_angle
 from doorstate.rules.walls import (
     WallParameters,
     covered_length_m,

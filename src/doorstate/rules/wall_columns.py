@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from doorstate.rules.floor_plan import FloorPlan, azimuth_rad
 from doorstate.doorways.plan_lines import Flags, Floats, Line
+from doorstate.rules.floor_plan import FloorPlan, azimuth_rad
 
 _MIN_GAP_COLUMNS = 3
 _BESIDE_HINGE_M = (0.1, 0.7)  # where a hinge has wall on one side and none on the other

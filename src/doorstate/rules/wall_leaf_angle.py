@@ -17,10 +17,10 @@ from dataclasses import dataclass
 import numpy as np
 from pydantic import Field
 
-from doorstate.rules.base import Detection, Parameters, Rule, RuleResult, measured_points
-from doorstate.rules.floor_plan import FloorPlan, azimuth_rad, floor_plan, strongest_lines
 from doorstate.doorways.plan_lines import Floats, Line, fit_line
 from doorstate.doorways.planes import voxel_downsample
+from doorstate.rules.base import Detection, Parameters, Rule, RuleResult, measured_points
+from doorstate.rules.floor_plan import FloorPlan, azimuth_rad, floor_plan, strongest_lines
 from doorstate.rules.wall_columns import Gap, WallColumns, wall_columns
 from doorstate.types import DoorState, Points
 

@@ -8,9 +8,9 @@ import math
 
 import numpy as np
 
-from doorstate.rules.base import Detection, Parameters, RuleResult, measured_points
 from doorstate.doorways.plan_lines import Flags, Floats
 from doorstate.doorways.planes import Plane
+from doorstate.rules.base import Detection, Parameters, RuleResult, measured_points
 from doorstate.types import DoorState, Points
 
 
