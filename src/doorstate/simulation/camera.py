@@ -14,6 +14,7 @@ from pydantic import Field, model_validator
 from doorstate._models import FrozenModel
 from doorstate.io.camera import MAX_SIDE_PX, Intrinsics
 from doorstate.io.size_limits import MAX_POINTS
+from doorstate.simulation.scene.box import Pose
 
 MAX_RANGE_M = 1000.0
 
@@ -76,6 +77,11 @@ class CameraPose(NamedTuple):
     ) -> Self:
         """Return a pose from angles in degrees."""
         return cls(*position_m, math.radians(yaw_deg), math.radians(pitch_deg), math.radians(roll_deg))
+
+    def seen_from(self, frame: Pose) -> CameraPose:
+        """Return the pose in a frame whose own pose in the door frame is given."""
+        x_m, y_m, yaw_rad = frame.inverse().after(Pose(self.x_m, self.y_m, self.yaw_rad))
+        return self._replace(x_m=x_m, y_m=y_m, yaw_rad=yaw_rad)
 
     def rotation(self) -> NDArray[np.float64]:
         """Return R_door_camera, (3, 3); camera axes x forward, y left, z up."""

@@ -8,9 +8,11 @@ from doorstate.simulation.frames import Frame, depth_sha256, replay
 from doorstate.simulation.noise.sensors import find_sensor
 from doorstate.simulation.occlusion import DoorView, occluded_bin
 from doorstate.simulation.presets import Preset, draw_rows
-from doorstate.simulation.render import cut_range
+from doorstate.simulation.render import Render, cut_range, render_behind_glass
 from doorstate.simulation.row import Row
+from doorstate.simulation.scene.box import Pose
 from doorstate.simulation.scene.scene import clutter_boxes
+from doorstate.simulation.true_door import VisiblePixels
 from doorstate.simulation.visibility import looks_into, opening_depth_m, same_image
 from doorstate.types import DepthImage, Part
 
@@ -26,16 +28,16 @@ def simulate_rows(
     rows = [with_sensor(row, sensor) for row in draw_rows(preset, seed, index)]
     frames = [replay(row) for row in rows]
     # Compared without noise: two states that differ in noise alone are still the same.
-    clean = [cut_range(frame.full, row.camera).depth_m for row, frame in zip(rows, frames, strict=True)]
-    opening_m = _opening_depth_m(rows[0])
+    clean = [cut_range(frame.full, row.camera) for row, frame in zip(rows, frames, strict=True)]
+    openings_m = _opening_depths_m(rows[0])
     described = []
-    for row, frame, depth_m in zip(rows, frames, clean, strict=True):
+    for row, frame, image in zip(rows, frames, clean, strict=True):
         columns: dict[str, object] = {
             "measured_px": int((frame.cut.part != Part.NONE).sum()),
-            "same_image_as": _same_images(row, depth_m, rows, clean),
+            "same_image_as": _same_images(row, image, rows, clean),
             "depth_sha256": depth_sha256(frame),
         }
-        described.append(row.model_copy(update=columns | _door_columns(row, frame, opening_m)))
+        described.append(row.model_copy(update=columns | _door_columns(row, frame, openings_m)))
     return described, frames
 
 
@@ -49,35 +51,78 @@ def with_sensor(row: Row, sensor: str) -> Row:
     return row.model_copy(update={"sensor": sensor} | ({} if camera == DepthCamera() else {"camera": camera}))
 
 
-def _same_images(row: Row, depth_m: DepthImage, rows: list[Row], images: list[DepthImage]) -> str:
-    """Return the states of the pose's other samples with the same image, sorted and separated by spaces."""
-    states = {
-        sample.state
-        for sample, image in zip(rows, images, strict=True)
-        if sample.state != row.state and same_image(depth_m, image)
-    }
-    return " ".join(sorted(states))
+def _same_images(row: Row, image: Render, rows: list[Row], images: list[Render]) -> str:
+    """Return the states of the pose's other samples with the same image, sorted and separated by spaces.
+
+    Beside other doors, which have states of their own: the states of the main door that would give the same image.
+    """
+    others = [
+        (sample, other) for sample, other in zip(rows, images, strict=True) if sample.state != row.state
+    ]
+    if row.other_doors:
+        main_leaf = (image.part == Part.LEAF) & (image.box < row.box_groups().doors()[0].stop)
+        others = [] if main_leaf.any() else [(sample, _render_with(row, sample)) for sample, _ in others]
+    return " ".join(
+        sorted({sample.state for sample, other in others if same_image(image.depth_m, other.depth_m)})
+    )
 
 
-def _opening_depth_m(row: Row) -> DepthImage | None:
-    door = row.scene.door
-    if door is None:
-        return None
-    size_m = door.opening_width_m, door.opening_height_m
-    return opening_depth_m(row.camera_pose(), row.camera.intrinsics(), *size_m)
+def _render_with(row: Row, sample: Row) -> Render:
+    """Render a row with the main door as in another sample."""
+    boxes = row.box_groups(sample.opening()).all()
+    return cut_range(render_behind_glass(boxes, row.camera_pose(), row.camera.intrinsics()), row.camera)
 
 
-def _door_columns(row: Row, frame: Frame, opening_m: DepthImage | None) -> dict[str, object]:
-    if opening_m is None:
+def _opening_depths_m(row: Row) -> list[DepthImage]:
+    """Return `opening_depth_m` of each door, first the main door."""
+    if row.scene.door is None:
+        return []
+    frames = [(row.scene.door, Pose(0.0, 0.0, 0.0))]
+    frames += [(placed.door, placed.pose(row.scene.near)) for placed in row.scene.other_doors or ()]
+    camera, intrinsics = row.camera_pose(), row.camera.intrinsics()
+    return [
+        opening_depth_m(camera.seen_from(pose), intrinsics, door.opening_width_m, door.opening_height_m)
+        for door, pose in frames
+    ]
+
+
+def _door_columns(row: Row, frame: Frame, openings_m: list[DepthImage]) -> dict[str, object]:
+    if not openings_m:
         return {}
+    ranges = row.box_groups().doors()
+    main, *others = (
+        count_visible(frame, numbers, opening_m)
+        for numbers, opening_m in zip(ranges, openings_m, strict=True)
+    )
     share = 0.0
     if row.scene.items:
-        view = DoorView(row.scene, row.opening(), row.camera_pose(), row.camera)
+        other_openings = [door.opening for door in row.other_doors]
+        view = DoorView(row.scene, row.opening(), row.camera_pose(), row.camera, other_openings)
         share = view.occluded_share(clutter_boxes(row.scene))
     return {
-        "visible_leaf_px": int((frame.cut.part == Part.LEAF).sum()),
-        "visible_frame_px": int((frame.cut.part == Part.FRAME).sum()),
-        "visible_opening_px": int(looks_into(frame.full.depth_m, opening_m).sum()),
+        "visible_leaf_px": main.leaf,
+        "visible_frame_px": main.frame,
+        "visible_opening_px": main.opening,
         "occluded_share": share,
         "occluded_bin": occluded_bin(share),
+        "other_doors": tuple(
+            door.model_copy(update={"truth": door.truth.model_copy(update={"visible_px": seen})})
+            for door, seen in zip(row.other_doors, others, strict=True)
+        ),
     }
+
+
+def count_visible(frame: Frame, numbers: range, opening_m: DepthImage) -> VisiblePixels:
+    """Count the pixels of a door.
+
+    Args:
+        frame: rendered sample.
+        numbers: numbers of the door's boxes.
+        opening_m: `opening_depth_m` of the door.
+    """
+    own = (frame.cut.box >= numbers.start) & (frame.cut.box < numbers.stop)
+    return VisiblePixels(
+        leaf=int((own & (frame.cut.part == Part.LEAF)).sum()),
+        frame=int((own & (frame.cut.part == Part.FRAME)).sum()),
+        opening=int(looks_into(frame.full.depth_m, opening_m).sum()),
+    )

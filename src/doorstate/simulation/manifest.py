@@ -18,9 +18,12 @@ MANIFEST_FILE = "manifest.csv"
 
 
 def flatten(row: Row) -> dict[str, str]:
-    """Return columns and their text in the order of the fields; None is an empty text."""
+    """Return columns and their text in the order of the fields; None is an empty text.
+
+    A row without other doors has no column of them, as in older manifests.
+    """
     columns: dict[str, str] = {}
-    for name, value in row.model_dump().items():
+    for name, value in row.model_dump(exclude=None if row.other_doors else {"other_doors"}).items():
         if isinstance(value, dict):
             columns |= {f"{name}.{key}": _text(inner) for key, inner in value.items()}
         else:

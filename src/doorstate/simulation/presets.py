@@ -3,15 +3,13 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Literal
 
 from doorstate._models import FrozenModel
 from doorstate.simulation.camera import DepthCamera
 from doorstate.simulation.draw.half_ring import half_ring, reduced_ring
-from doorstate.simulation.draw.openings import state_of
 from doorstate.simulation.draw.paper import FIXED_ANGLES_DEG, draw_paper_scene
 from doorstate.simulation.draw.scenes import (
     DrawnScene,
@@ -23,8 +21,11 @@ from doorstate.simulation.draw.scenes import (
 from doorstate.simulation.draw.stream import Stream
 from doorstate.simulation.draw.viewpoints import Viewpoint
 from doorstate.simulation.row import Row
-from doorstate.simulation.scene.clearance import passable_width_m
+from doorstate.simulation.scene.box import Pose
 from doorstate.simulation.scene.door import Door, Opening
+from doorstate.simulation.scene.scene import Scene
+from doorstate.simulation.true_door import OtherDoor, describe_door
+from doorstate.simulation.truth import main_columns
 from doorstate.types import NO_DOOR
 
 PresetName = Literal[
@@ -110,38 +111,29 @@ def draw_rows(preset: Preset, seed: int, index: int) -> list[Row]:
     if door is None:
         return [row]
     by_angle = preset.name == "varied-angles"
-    row = row.model_copy(update=_door_pose(view))
-    return [
-        row.model_copy(update=_door_columns(pose_id, door, opening, f"a{number}" if by_angle else None))
-        for number, opening in enumerate(drawn.openings)
-    ]
+    samples = []
+    for number, opening in enumerate(drawn.openings):
+        camera = Pose(view.x_m, view.y_m, view.heading_rad)
+        columns = main_columns(describe_door(door, opening, camera, view.camera_height_m))
+        name = f"a{number}" if by_angle else columns["state"]
+        others = drawn.other_openings[number] if scene.other_doors else ()
+        samples.append(
+            row.model_copy(
+                update=columns
+                | {"sample_id": f"{pose_id}-{name}", "other_doors": _other_doors(scene, others, view)}
+            )
+        )
+    return samples
 
 
-def _door_columns(pose_id: str, door: Door, opening: Opening, name: str | None) -> dict[str, object]:
-    state, ambiguous = state_of(door, opening)
-    return {
-        "sample_id": f"{pose_id}-{name or state}",
-        "state": str(state),
-        "ambiguous": ambiguous,
-        "door_kind": door.kind,
-        "hinge": "" if door.is_sliding else door.hinge,
-        "swing": door.swing,
-        "opening_angle_deg": None if door.is_sliding else opening.angle_deg,
-        "passive_angle_deg": opening.passive_angle_deg if door.is_double else None,
-        "opening_share": opening.share if door.is_sliding else None,
-        "opening_width_m": door.opening_width_m,
-        "opening_height_m": door.opening_height_m,
-        "passable_width_m": round(passable_width_m(door, opening), 4),
-    }
-
-
-def _door_pose(view: Viewpoint) -> dict[str, float]:
-    """Return the door frame in the sensor frame."""
-    cos, sin = math.cos(view.heading_rad), math.sin(view.heading_rad)
-    # The camera's own frame has the door at R(-heading) (door - camera).
-    return {
-        "door_x_m": -view.x_m * cos - view.y_m * sin,
-        "door_y_m": view.x_m * sin - view.y_m * cos,
-        "door_z_m": -view.camera_height_m,
-        "door_yaw_deg": math.degrees(math.remainder(-view.heading_rad, 2 * math.pi)),
-    }
+def _other_doors(scene: Scene, openings: Sequence[Opening], view: Viewpoint) -> tuple[OtherDoor, ...]:
+    camera = Pose(view.x_m, view.y_m, view.heading_rad)
+    return tuple(
+        OtherDoor(
+            opening=opening,
+            truth=describe_door(
+                placed.door, opening, placed.pose(scene.near).inverse().after(camera), view.camera_height_m
+            ),
+        )
+        for placed, opening in zip(scene.other_doors or (), openings, strict=True)
+    )

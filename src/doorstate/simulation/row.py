@@ -3,9 +3,10 @@
 
 from __future__ import annotations
 
-from typing import Literal
+import json
+from typing import Literal, Self
 
-from pydantic import field_serializer, field_validator
+from pydantic import Field, field_serializer, field_validator, model_validator
 
 from doorstate._documents import parse_json
 from doorstate._models import Degrees, FrozenModel, Metres, Seed
@@ -13,7 +14,8 @@ from doorstate.errors import DatasetError
 from doorstate.simulation.camera import CameraPose, DepthCamera
 from doorstate.simulation.scene.box import Box
 from doorstate.simulation.scene.door import Opening
-from doorstate.simulation.scene.scene import Scene, scene_boxes
+from doorstate.simulation.scene.scene import BoxGroups, Scene, box_groups
+from doorstate.simulation.true_door import OtherDoor
 
 
 class Row(FrozenModel):
@@ -22,7 +24,7 @@ class Row(FrozenModel):
     The scene, opening, camera, pose, sensor, seed and name rebuild the frame; the other columns describe it. Poses are
     in the door frame, except `door_*`, which is the door frame in the sensor frame. Columns that do not apply are
     empty: those of the door in scenes without one, angles of a sliding door, and `scene_id` where all samples of a data
-    set show the same scene.
+    set show the same scene. All columns of a door describe the main door; `other_doors` holds those beside it.
     """
 
     sample_id: str
@@ -57,6 +59,7 @@ class Row(FrozenModel):
     sensor: str = "none"  # a name for noise.sensors.find_sensor
     camera: DepthCamera
     scene: Scene
+    other_doors: tuple[OtherDoor, ...] = Field(default=(), max_length=20)
     clutter_tries: int = 0
     occluded_share: float | None = None
     occluded_bin: str = ""
@@ -71,13 +74,23 @@ class Row(FrozenModel):
     def _scene_to_json(self, scene: Scene) -> str:
         return scene.model_dump_json(exclude_none=True)
 
-    @field_validator("scene", mode="before")
+    @field_serializer("other_doors")
+    def _other_doors_to_json(self, doors: tuple[OtherDoor, ...]) -> str | None:
+        return json.dumps([door.model_dump(mode="json") for door in doors]) if doors else None
+
+    @field_validator("scene", "other_doors", mode="before")
     @classmethod
-    def _scene_from_json(cls, scene: object) -> object:
+    def _from_json(cls, value: object) -> object:
         try:
-            return parse_json(scene, DatasetError) if isinstance(scene, str) else scene
+            return parse_json(value, DatasetError) if isinstance(value, str) else value
         except DatasetError as error:
             raise ValueError(error.message) from error
+
+    @model_validator(mode="after")
+    def _check_other_doors(self) -> Self:
+        if len(self.other_doors) != len(self.scene.other_doors or ()):
+            raise ValueError("one entry of other_doors for each of the scene")
+        return self
 
     def camera_pose(self) -> CameraPose:
         """Return the camera in the door frame."""
@@ -92,6 +105,11 @@ class Row(FrozenModel):
             share=self.opening_share or 0.0,
         )
 
+    def box_groups(self, opening: Opening | None = None) -> BoxGroups:
+        """Return the boxes of the scene in the door frame, by what they belong to; by default with its own opening."""
+        others = [door.opening for door in self.other_doors]
+        return box_groups(self.scene, opening or self.opening(), others)
+
     def boxes(self) -> list[Box]:
         """Return the boxes of the scene in the door frame."""
-        return scene_boxes(self.scene, self.opening())
+        return self.box_groups().all()

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from doorstate.errors import ConfigError
@@ -38,6 +39,7 @@ class DrawnScene(NamedTuple):
     viewpoint: Viewpoint
     openings: list[Opening]
     clutter_tries: int = 0
+    other_openings: Sequence[tuple[Opening, ...]] = ()  # of the other doors, one entry for each of `openings`
 
 
 def draw_varied(stream: Stream) -> DrawnScene:

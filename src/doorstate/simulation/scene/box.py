@@ -23,6 +23,29 @@ class Box(NamedTuple):
     material: Material = "matte"
 
 
+class Pose(NamedTuple):
+    """A frame on the floor: its origin, and its turn about z."""
+
+    x_m: float
+    y_m: float
+    yaw_rad: float
+
+    def after(self, inner: Pose) -> Pose:
+        """Return, in the outer frame, the pose of a frame whose pose in this one is `inner`."""
+        cos, sin = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
+        x, y = inner.x_m * cos - inner.y_m * sin, inner.x_m * sin + inner.y_m * cos
+        return Pose(self.x_m + x, self.y_m + y, self.yaw_rad + inner.yaw_rad)
+
+    def inverse(self) -> Pose:
+        """Return the pose of the outer frame in this one."""
+        cos, sin = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
+        return Pose(-self.x_m * cos - self.y_m * sin, self.x_m * sin - self.y_m * cos, -self.yaw_rad)
+
+    def place(self, boxes: Sequence[Box]) -> list[Box]:
+        """Return boxes of this frame in the outer frame."""
+        return place(boxes, *self)
+
+
 def place(boxes: Sequence[Box], x_m: float, y_m: float, yaw_rad: float) -> list[Box]:
     """Rotate boxes about the z axis, then translate them."""
     cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)

@@ -7,22 +7,37 @@ A door is built with the hinge on the right and the leaf towards the robot, then
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from doorstate.simulation.scene.box import Box, mirror, place
 from doorstate.simulation.scene.door import Door, Opening
-from doorstate.simulation.scene.frame import frame_boxes, wall_boxes
+from doorstate.simulation.scene.frame import frame_boxes
 from doorstate.simulation.scene.leaf import hinged_leaf, leaf_widths_m, sliding_leaf
+from doorstate.simulation.scene.wall import Gap, door_gap, wall_boxes
 
 
-def door_boxes(door: Door, opening: Opening) -> list[Box]:
+def door_boxes(door: Door, opening: Opening, neighbours: Sequence[Gap] = ()) -> list[Box]:
     """Return wall, frame and leaves; the wall comes first and the leaves last."""
-    return [*fixed_boxes(door), *leaf_boxes(door, opening)]
+    return [*fixed_boxes(door, neighbours), *leaf_boxes(door, opening)]
 
 
-def fixed_boxes(door: Door) -> list[Box]:
-    """Return the parts that do not move: wall, frame, threshold and track."""
-    boxes = [*wall_boxes(door), *frame_boxes(door)]
-    return _to_hinge_and_swing([box for box in boxes if min(box.size_m) > 0], door)
+def fixed_boxes(door: Door, neighbours: Sequence[Gap] = ()) -> list[Box]:
+    """Return the parts that do not move: wall, frame, threshold and track.
+
+    Args:
+        door: door in its wall.
+        neighbours: gaps of other doors in the same wall.
+    """
+    ends_m = (-door.wall_half_length_m, door.wall_half_length_m)
+    sign = -1.0 if door.hinge == "left" else 1.0
+    gaps = [door_gap(door), *(gap._replace(x_m=sign * gap.x_m) for gap in neighbours)]
+    wall = wall_boxes(ends_m, door.wall_thickness_m, door.wall_height_m, gaps)
+    return [*_to_hinge_and_swing(wall, door), *_frame_boxes(door)]
+
+
+def frame_and_leaf_boxes(door: Door, opening: Opening) -> list[Box]:
+    """Return a door without its wall; the leaves come last."""
+    return [*_frame_boxes(door), *leaf_boxes(door, opening)]
 
 
 def leaf_boxes(door: Door, opening: Opening) -> list[Box]:
@@ -42,6 +57,10 @@ def turn_leaf(door: Door, leaf: list[Box], angle_deg: float) -> list[Box]:
     """Move boxes from a leaf's frame to the door frame, for a hinge on the right and a swing towards the robot."""
     x = -door.opening_width_m / 2 + door.leaf_gap_m
     return place(leaf, x, door.hinge_offset_m - door.leaf_recess_m, math.radians(angle_deg))
+
+
+def _frame_boxes(door: Door) -> list[Box]:
+    return _to_hinge_and_swing([box for box in frame_boxes(door) if min(box.size_m) > 0], door)
 
 
 def _to_hinge_and_swing(boxes: list[Box], door: Door) -> list[Box]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Fixed parts of a door: wall, jambs, casings, stop, threshold and the track of a sliding leaf.
+"""Fixed parts of a door: jambs, casings, stop, threshold and the track of a sliding leaf.
 
 All are built with the hinge on the right and the leaf towards the robot; `door_boxes` mirrors them.
 """
@@ -12,20 +12,6 @@ from doorstate.types import Part
 
 SLIDING_OVERLAP_M = 0.03  # of a leaf in front of the wall, at both sides and above
 _TRACK_M = 0.05
-
-
-def wall_boxes(door: Door) -> list[Box]:
-    """Return the wall on both sides of the opening and above it."""
-    inner = door.opening_width_m / 2 + door.jamb_thickness_m
-    top = door.opening_height_m + door.jamb_thickness_m
-    length = door.wall_half_length_m - inner
-    y = -door.wall_thickness_m / 2
-    side = (length, door.wall_thickness_m, door.wall_height_m)
-    lintel = (2 * inner, door.wall_thickness_m, door.wall_height_m - top)
-    return [
-        *(Box(Part.WALL, (sign * (inner + length / 2), y, door.wall_height_m / 2), side) for sign in (1, -1)),
-        Box(Part.WALL, (0.0, y, (top + door.wall_height_m) / 2), lintel),
-    ]
 
 
 def frame_boxes(door: Door) -> list[Box]:

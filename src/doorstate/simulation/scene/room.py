@@ -3,13 +3,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 from doorstate._models import FrozenModel, Metres
 from doorstate.simulation.scene.box import Box
 from doorstate.types import Part
 
 _WALL_M = 0.1
 _FLOOR_M = 0.1
-_LONG_M = 8.0  # length of walls without an end: beyond the camera's range
+LONG_M = 8.0  # length of walls without an end: beyond the camera's range
 
 
 class Space(FrozenModel):
@@ -20,17 +22,27 @@ class Space(FrozenModel):
     depth_m: Metres | None = None
 
 
-def space_boxes(space: Space, wall_y_m: float, side: int, height_m: float) -> list[Box]:
-    """Return the walls of a space that begins at the wall face `wall_y_m`, towards +y (side 1) or -y (side -1)."""
-    depth = space.depth_m or _LONG_M
-    left, right = space.left_m or _LONG_M, space.right_m or _LONG_M
+def space_boxes(
+    space: Space, wall_y_m: float, side: int, height_m: float, without: Collection[str] = ()
+) -> list[Box]:
+    """Return the walls of a space that begins at the wall face `wall_y_m`, towards +y (side 1) or -y (side -1).
+
+    Args:
+        space: distances of the walls.
+        wall_y_m: y of the face.
+        side: direction of the space.
+        height_m: height of its walls.
+        without: walls to leave out, of `left`, `opposite` and `right`.
+    """
+    depth = space.depth_m or LONG_M
+    left, right = space.left_m or LONG_M, space.right_m or LONG_M
     middle_y, z = wall_y_m + side * depth / 2, height_m / 2
     boxes = []
-    if space.left_m:
+    if space.left_m and "left" not in without:
         boxes.append(Box(Part.WALL, (left + _WALL_M / 2, middle_y, z), (_WALL_M, depth, height_m)))
-    if space.right_m:
+    if space.right_m and "right" not in without:
         boxes.append(Box(Part.WALL, (-right - _WALL_M / 2, middle_y, z), (_WALL_M, depth, height_m)))
-    if space.depth_m:
+    if space.depth_m and "opposite" not in without:
         y = wall_y_m + side * (depth + _WALL_M / 2)
         boxes.append(Box(Part.WALL, ((left - right) / 2, y, z), (left + right, _WALL_M, height_m)))
     return boxes
