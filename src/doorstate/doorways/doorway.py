@@ -9,18 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from doorstate.doorways.cues import Cues
 from doorstate.types import Points
-
-
-@dataclass(frozen=True)
-class Cues:
-    """Evidence for a doorway, each from 0 (none) to 1 (clear)."""
-
-    seen_through: float = 0.0  # sight lines that cross the opening at heights of a person
-    gap: float = 0.0  # the wall is missing
-    jambs: float = 0.0  # edges of casing, reveal or leaf at both ends
-    leaf: float = 0.0  # an upright surface hangs on one end, or lies in the opening
-    bare: float = 0.0  # unbroken wall, which a flush leaf cannot be told from
 
 
 @dataclass(frozen=True)

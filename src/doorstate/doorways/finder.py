@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Candidate doorways of a level cloud: walls, their elevations, and the likeliest columns of each."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from doorstate._models import FrozenModel
+from doorstate.clouds.measured import is_measured
+from doorstate.doorways.column_scorer import ColumnScores, score_columns
+from doorstate.doorways.cues import find_cues
+from doorstate.doorways.doorway import Doorway
+from doorstate.doorways.elevation import COLUMN_M, wall_elevation
+from doorstate.doorways.plan_lines import Floats, angle_deg
+from doorstate.doorways.walls import Wall, find_walls
+from doorstate.types import Points
+
+_MAX_POINTS = 40_000
+_LOWEST_SHARE = 0.01  # of the points; they are the floor where no other is known
+_UPRIGHT_M = (0.15, 2.2)  # heights above the floor without floor, skirting boards and ceiling
+_PEAK_M = 0.3  # a column is a peak if none so near scores higher
+_SNAP_M, _MIN_END = 0.2, 0.3  # of an edge from the end that a column proposes, and its least probability
+_SAME_M, _SAME_DEG = 0.3, 20.0  # candidates of two walls that are one doorway
+
+
+class FinderSettings(FrozenModel):
+    """Limits of the finder.
+
+    Attributes:
+        most: candidates of a cloud.
+        min_score: least probability of a candidate.
+        width_m: least and largest width.
+    """
+
+    most: int = Field(default=8, ge=1, le=100)
+    min_score: float = Field(default=0.02, ge=0, le=1)
+    width_m: tuple[float, float] = (0.6, 2.4)
+
+
+DEFAULT_FINDER = FinderSettings()
+
+
+def find_doorways(
+    cloud: Points, floor_z_m: float | None = None, settings: FinderSettings = DEFAULT_FINDER
+) -> list[Doorway]:
+    """Return the candidate doorways of a cloud, the likeliest first.
+
+    Args:
+        cloud: (N, 3) or organized (H, W, 3) metres, level sensor frame, NaN where nothing was measured.
+        floor_z_m: height of the floor; None takes that of the lowest points.
+        settings: limits.
+    """
+    points = thinned(cloud)
+    if len(points) == 0:
+        return []
+    floor_m = float(np.quantile(points[:, 2], _LOWEST_SHARE)) if floor_z_m is None else floor_z_m
+    height_m = points[:, 2] - np.float32(floor_m)
+    upright = points[(height_m > _UPRIGHT_M[0]) & (height_m < _UPRIGHT_M[1])].astype(np.float64)
+    found = [doorway for wall in find_walls(upright) for doorway in _on_wall(wall, points, floor_m, settings)]
+    distinct: list[Doorway] = []
+    for doorway in sorted(found, key=lambda candidate: -candidate.score):
+        if not any(_are_one(doorway, better) for better in distinct):
+            distinct.append(doorway)
+    return distinct[: settings.most]
+
+
+def thinned(cloud: Points) -> NDArray[np.float32]:
+    """Return measured points (N, 3) of some rows and columns of an image, or of some points of a flat cloud."""
+    step = math.ceil(math.sqrt(cloud.size / 3 / _MAX_POINTS)) if cloud.ndim == 3 else 1
+    some = cloud[::step, ::step].reshape(-1, 3) if cloud.ndim == 3 else cloud
+    points = some[is_measured(some)]
+    return np.asarray(points[:: max(1, len(points) // _MAX_POINTS)], dtype=np.float32)
+
+
+def _on_wall(
+    wall: Wall, points: NDArray[np.float32], floor_m: float, settings: FinderSettings
+) -> Iterator[Doorway]:
+    elevation = wall_elevation(wall, points, floor_m)
+    scores = score_columns(elevation, wall.distance_m)
+    for peak in _peaks(scores.middles.probability, settings.min_score):
+        right_m, left_m = _ends(scores, peak)
+        middle_m, width_m = (right_m + left_m) / 2, float(np.clip(left_m - right_m, *settings.width_m))
+        x_m, y_m = wall.line.at(middle_m) + wall.line.normal * scores.behind_m[peak]
+        yield Doorway(
+            x_m=float(x_m),
+            y_m=float(y_m),
+            yaw_deg=wall.yaw_deg,
+            width_m=width_m,
+            floor_z_m=floor_m,
+            score=float(scores.middles.probability[peak]),
+            cues=find_cues(elevation, right_m, left_m),
+        )
+
+
+def _ends(scores: ColumnScores, peak: int) -> tuple[float, float]:
+    """Return the right and left end of the doorway of a column: visible edges, where there are, else by its width."""
+    middle_m, half_m = scores.middles.along_m[peak], scores.width_m[peak] / 2
+    proposed = [float(middle_m - half_m), float(middle_m + half_m)]
+    snapped: list[float | None] = []
+    for places, end_m in zip(scores.ends, proposed, strict=True):
+        weight = places.probability * np.exp(-(((places.along_m - end_m) / _SNAP_M) ** 2))
+        best = int(weight.argmax())
+        snapped.append(float(places.along_m[best]) if weight[best] >= _MIN_END else None)
+    right_m, left_m = snapped
+    if right_m is not None and left_m is not None:
+        return right_m, left_m
+    if right_m is not None:
+        return right_m, right_m + 2 * float(half_m)
+    if left_m is not None:
+        return left_m - 2 * float(half_m), left_m
+    return proposed[0], proposed[1]
+
+
+def _peaks(probability: Floats, min_score: float) -> list[int]:
+    """Return the columns with the highest score of their surroundings."""
+    reach = round(_PEAK_M / COLUMN_M)
+    padded = np.pad(probability, reach)
+    highest = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1).max(axis=1)
+    peaks: list[int] = np.flatnonzero((probability == highest) & (probability >= min_score)).tolist()
+    return peaks
+
+
+def _are_one(first: Doorway, second: Doorway) -> bool:
+    near = math.hypot(first.x_m - second.x_m, first.y_m - second.y_m) <= _SAME_M
+    axes = [
+        np.array([math.cos(math.radians(yaw)), math.sin(math.radians(yaw))])
+        for yaw in (first.yaw_deg, second.yaw_deg)
+    ]
+    return near and angle_deg(*axes) <= _SAME_DEG
