@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from doorstate.simulation.truth import true_doors
 
 from doorstate.doorways.doorway import Doorway
 from doorstate.doorways.finder import FinderSettings, find_doorways, thinned
@@ -20,6 +19,7 @@ from doorstate.simulation.frames import Frame, level
 from doorstate.simulation.generate import simulate_rows
 from doorstate.simulation.presets import PRESETS
 from doorstate.simulation.row import Row
+from doorstate.simulation.truth import true_doors
 from doorstate.types import Points
 
 _GAZEBO = Path(__file__).resolve().parents[1] / "fixtures" / "gazebo"

@@ -2,8 +2,8 @@
 """Likeness of every column of a wall to the middle of a doorway, by a small network over the wall's elevation.
 
 The network has 28,000 parameters, takes half a millisecond a wall and was trained on simulated walls (`python -m paper
-finder`). It knows edges which no threshold finds: a casing of 5 mm is less than the noise of a pixel, and more than that
-of a column.
+finder`). It knows edges which no threshold finds: a casing of 5 mm is less than the noise of a pixel, and more than
+that of a column.
 """
 
 from __future__ import annotations
