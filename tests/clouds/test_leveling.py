@@ -43,6 +43,12 @@ def test_known_height_is_the_floor_where_none_is_seen() -> None:
     assert leveling.floor_z_m == -1.1
 
 
+def test_whole_numbers_are_turned_too() -> None:
+    millimetres = np.round(measure(ROOM, pitch_deg=25) * 1000)
+    cloud = np.where(np.isfinite(millimetres), millimetres, 0).astype(np.int64)
+    assert level_cloud(cloud, pitch_deg=25).points.dtype.kind == "f"
+
+
 def test_no_cloud_is_refused() -> None:
     with pytest.raises(CloudContentError):
         level_cloud(np.zeros((5, 4), np.float32))

@@ -49,7 +49,7 @@ def _low_points(points: NDArray[Any]) -> Points:
     flat = points.reshape(-1, 3)
     # An odd step meets all columns of an image.
     sample = flat[:: len(flat) // _SAMPLE_POINTS | 1].astype(np.float32)
-    with np.errstate(invalid="ignore"):
+    with np.errstate(invalid="ignore", over="ignore"):
         ahead, across = sample[:, 0] / _CELL_M, np.abs(sample[:, 1]) / (_CELL_M / 2)
         inside = (ahead > 0) & (ahead < _AHEAD) & (across < _ACROSS)
         return sample[inside & (sample[:, 2] > _LOWEST_M) & (sample[:, 2] < _HIGHEST_M)]

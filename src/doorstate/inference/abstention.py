@@ -18,6 +18,13 @@ AbstentionCode = Literal[
     "too_far",
     "too_small",
     "narrow_view",
+    "tilt_no_planes",  # these by `clouds.vertical`
+    "tilt_against_wall",
+    "tilt_one_plane",
+    "tilt_too_steep",
+    "tilt_ambiguous",
+    "tilt_upside_down",
+    "tilt_unsure",
     "hole",  # glass or missing data: no free way is visible
     "invalid_outputs",  # of the network: not finite, or no probabilities
     "door_hole",  # a dark or glass leaf, or an open door into nothing
@@ -40,6 +47,21 @@ SENTENCES: dict[AbstentionCode, str] = {
     "too_small": "the surfaces are only {width_m:.2f} m wide and {height_m:.2f} m high: too little for a door",
     "narrow_view": "the view is only {view_deg:.0f} degrees wide: at least {min_view_deg:g} are needed",
     "hole": "{share:.0%} of the view ahead is a hole without a floor {free_reach_m:g} m away: glass or missing data",
+    "tilt_no_planes": "the tilt is unknown: only {share:.0%} of the view is flat, at least {min_share:.0%} must be",
+    "tilt_against_wall": (
+        "the tilt is unknown: half of the points are within {ahead_m:.2f} m, something is before the camera"
+    ),
+    "tilt_one_plane": "the tilt is unknown: all surfaces face one way, such as a wall or a floor alone",
+    "tilt_too_steep": "the camera looks more than {max_pitch_deg:g} degrees up or down",
+    "tilt_ambiguous": (
+        "the tilt is unknown: a pitch of {pitch_deg:.0f} and a roll of {roll_deg:.0f} degrees, or of "
+        "{other_pitch_deg:.0f} and {other_roll_deg:.0f}"
+    ),
+    "tilt_upside_down": (
+        "the tilt is unknown: the camera may be upside down, with a roll of {roll_deg:.0f} or "
+        "{other_roll_deg:.0f} degrees"
+    ),
+    "tilt_unsure": "the tilt is unsure: its error is {error_deg:.1f} degrees, at most {max_error_deg:g} may be",
     "invalid_outputs": "the network's outputs are not valid numbers: its weights or the machine are damaged",
     "door_hole": (
         "a hole like a doorway, {width_m:.1f} m wide and {height_m:.1f} m high, {distance_m:.1f} m away, and no floor "
