@@ -14,7 +14,7 @@ from sphinx.application import Sphinx
 from typer.testing import CliRunner
 
 from doorstate import __version__
-from doorstate.cli import app as command_line
+from doorstate.cli.application import app as command_line
 
 project = "doorstate"
 author = copyright = "The doorstate developers"

@@ -15,7 +15,6 @@ import pytest
 
 from doorstate._files import atomic_path, check_writable, is_vacant, read_csv, write_csv, write_text
 from doorstate.errors import DatasetError, OutputError
-from tests.attack.torn_files import count_torn, isolation
 
 
 def test_the_target_appears_when_the_block_ends(tmp_path: Path) -> None:
@@ -166,7 +165,3 @@ def test_other_files_are_dataset_errors(tmp_path: Path, content: bytes | None) -
 def test_a_table_saved_by_a_spreadsheet_has_the_same_columns(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("file,state\na.pcd,open\n", encoding="utf-8-sig")
     assert read_csv(tmp_path / "a.csv") == [{"file": "a.pcd", "state": "open"}]
-
-
-def test_processes_with_one_number_never_show_a_torn_file(tmp_path: Path) -> None:
-    assert count_torn(tmp_path / "a.txt", isolation()) == 0

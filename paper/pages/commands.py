@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import typer
 
-from doorstate.cli import app
+from doorstate.cli.application import app
 from doorstate.cli.choices import fill_in
 
 

@@ -9,8 +9,8 @@ and the command line's help stay quick.
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING
 
+TYPE_CHECKING = False  # importing the module typing takes longer than all that is imported here
 if TYPE_CHECKING:
     from doorstate.inference.gate import Gate
     from doorstate.inference.prediction import Prediction

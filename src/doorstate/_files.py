@@ -9,6 +9,7 @@ the rename.
 from __future__ import annotations
 
 import csv
+import glob
 import gzip
 import io
 import os
@@ -91,6 +92,12 @@ def check_writable(target: Path) -> None:
 def is_scratch(path: Path) -> bool:
     """Return True for temporary files of interrupted writes, and files of locks."""
     return _SCRATCH.fullmatch(path.name) is not None
+
+
+def remove_scratch(target: Path) -> None:
+    """Remove temporary files of killed processes that were writing `target`."""
+    for path in target.parent.glob(f".*.tmp.{glob.escape(target.name)}"):
+        path.unlink(missing_ok=True)
 
 
 def is_vacant(folder: Path) -> bool:

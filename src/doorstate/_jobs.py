@@ -8,18 +8,19 @@ import os
 import re
 import signal
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
-from multiprocessing.synchronize import Event
+from contextlib import closing, contextmanager
+from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import NamedTuple, Self, TypeVar
 
+from doorstate._files import remove_scratch
 from doorstate.errors import ConfigError, RunError
 
 Piece = TypeVar("Piece")
 Progress = Callable[[int, int], None]  # (pieces done, total)
-_POLL_S = 0.2
 
 
 class Shard(NamedTuple):
@@ -88,19 +89,26 @@ def run_pieces(
         return
     # spawn: a forked child of a process that runs torch or BLAS threads can hang.
     context = multiprocessing.get_context("spawn")
-    stop = context.Event()
-    with ProcessPoolExecutor(min(workers, len(missing)), context, _end_with_parent, (stop,)) as pool:
-        futures = [pool.submit(work, piece, path) for piece, path in missing]
+    worker_end, parent_end = context.Pipe(duplex=False)
+    with (
+        closing(parent_end),
+        closing(worker_end),
+        ProcessPoolExecutor(min(workers, len(missing)), context, _end_with_parent, (worker_end,)) as pool,
+    ):
         try:
+            with interrupts_blocked():
+                futures = [pool.submit(work, piece, path) for piece, path in missing]
             for future in as_completed(futures):
                 future.result()
                 done += 1
                 progress(done, len(pieces))
         except BaseException as error:
             if not isinstance(error, Exception):
-                stop.set()
+                parent_end.close()
             # The with block alone would not wait for the workers, which would continue to write after the return.
             pool.shutdown(cancel_futures=True)
+            for _, path in missing:
+                remove_scratch(path)
             if isinstance(error, BrokenProcessPool):
                 raise RunError(
                     "a worker process was killed, perhaps for lack of memory",
@@ -109,16 +117,32 @@ def run_pieces(
             raise
 
 
-def _end_with_parent(stop: Event) -> None:
-    """End a worker when its parent is killed or stopped: an orphan would write beside the restarted job."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent handles it, and workers print no tracebacks
-    parent = multiprocessing.parent_process()
-    if parent is None:
+@contextmanager
+def interrupts_blocked() -> Iterator[None]:
+    """Block SIGINT in processes that are started within the block, from their first moment on.
+
+    The parent handles Ctrl-C, which a terminal sends to its workers too; those that import would print tracebacks.
+    """
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
+        yield
         return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _end_with_parent(parent: Connection) -> None:
+    """End a worker when its parent is killed or stopped: an orphan would write beside the restarted job.
+
+    Args:
+        parent: connection that the parent holds open; no lock, which a killed worker would keep.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # where it is not blocked
 
     def watch() -> None:
-        while parent.is_alive() and not stop.wait(_POLL_S):
-            pass
+        parent.poll(None)
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()

@@ -1,17 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Two processes on one folder, with equal process numbers: no file is torn or mixed."""
+"""Two processes on one folder or file, with equal process numbers: no file is torn or mixed."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
+from threading import Thread
 
-from doorstate._files import is_scratch
-from tests.attack.processes import Command, run
+from doorstate._files import is_scratch, write_text
+from tests.attack.processes import Command, Process, run
 from tests.attack.samples import POINTS, contents, prepared, simulated
 from tests.attack.tries import Try, Violation, attempt
 
-_TIMES = ("seconds", "epochs_per")
+_LETTERS = 100_000
 _PAIRS = {"simulate": 40, "prepare": 40, "train": 10, "compare": 10}  # of a hundred
 
 
@@ -59,6 +61,40 @@ def attack_shards(folder: Path, rounds: int) -> Iterator[Try]:
             return "same files as alone"
 
         yield attempt("two shards of `prepare` at once", judge, Violation.TORN)
+
+
+def attack_files(folder: Path, rounds: int) -> Iterator[Try]:
+    """Write one file from two processes of two threads each, both process 1 of a container, while it is read."""
+    target = folder / "shared" / "target.txt"
+    target.parent.mkdir()
+    for _ in range(rounds):
+        pair = [Process(folder, partial(_write, target, letters), first=True) for letters in ("ab", "cd")]
+        torn = 0
+        while any(one.is_running() for one in pair):
+            if target.exists():
+                text = target.read_text(encoding="utf-8")
+                torn += len(text) != _LETTERS or len(set(text)) != 1
+        codes = [one.wait().code for one in pair]
+
+        def judge() -> str:
+            assert not torn, f"torn {torn} times"  # noqa: B023
+            assert codes == [0, 0], f"exit codes {codes}"  # noqa: B023
+            assert list(target.parent.iterdir()) == [target], "temporary files are left"
+            return "whole"
+
+        yield attempt("two processes of two threads write one file", judge, Violation.TORN)
+
+
+def _write(target: Path, letters: str) -> None:
+    def work(letter: str) -> None:
+        for _ in range(30):
+            write_text(target, letter * _LETTERS, durable=False)
+
+    threads = [Thread(target=work, args=letter) for letter in letters]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
 
 
 def _results(folder: Path) -> dict[str, bytes]:

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from doorstate._files import is_scratch
-from tests.attack.processes import Command
+from tests.attack.processes import Command, wait_for_handlers
 from tests.attack.samples import POINTS, first_cloud, prepared
 from tests.attack.tries import Try, Violation
 
@@ -43,21 +43,11 @@ def attack_commands(folder: Path, rounds: int) -> Iterator[Try]:
                     out = out.with_suffix(".onnx")
                 last = 1 if arguments[0] == "view" else out
                 running = Command(folder, [*arguments, last])
-                _wait_for_start(running.pid)
+                wait_for_handlers(running.pid)
                 time.sleep(_STEP_S * (number + 1))
                 os.kill(running.pid, kind)
                 done = running.wait(60)
                 name = f"{signal.Signals(kind).name} in `{arguments[0]}`"
                 left = [path for path in out.rglob("*") if is_scratch(path)] if out.is_dir() else []
-                one = done.as_try(name, (code, 0))
+                one = done.as_try(name, (code, -kind, 0))
                 yield Try(name, "temporary files are left", Violation.TORN) if left else one
-
-
-def _wait_for_start(pid: int) -> None:
-    """Wait until a process handles SIGTERM; before that, the signal ends it without a word."""
-    deadline = time.monotonic() + 60
-    while time.monotonic() < deadline:
-        status = dict(line.split(":\t", 1) for line in Path(f"/proc/{pid}/status").read_text().splitlines())
-        if int(status.get("SigCgt", "0"), 16) & 1 << signal.SIGTERM - 1 or status["State"].startswith("Z"):
-            return
-        time.sleep(0.02)

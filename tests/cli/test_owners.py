@@ -53,7 +53,7 @@ def test_a_folder_has_one_owner(
     finally:
         first.kill()
         first.wait()
-    assert first.returncode == 143
+    assert first.returncode == -signal.SIGTERM
     assert errors.splitlines()[-1].startswith("doorstate: terminated")
     assert "Traceback" not in errors
     assert [path for path in out.rglob("*") if is_scratch(path)] == []

@@ -15,7 +15,7 @@ import typer
 from paper.pages.commands import list_options, share_options
 
 import doorstate
-from doorstate.cli import app
+from doorstate.cli.application import app
 from doorstate.cli.flags import format_flag
 from doorstate.serving.request import PredictQuery, format_parameter
 

@@ -4,22 +4,19 @@
 from __future__ import annotations
 
 import os
-import signal
 import sys
-import threading
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from typing import Any
 
 from typer.core import TyperCommand
 
 from doorstate.cli.choices import fill_in
 from doorstate.cli.flags import format_flag
+from doorstate.cli.signals import raise_in
 from doorstate.errors import ConfigError, DoorstateError, needs_extra
 
 CLOSED_PIPE = 141  # exit code of programs that SIGPIPE ends
-TERMINATED = 128 + signal.SIGTERM
-_ENDS_ITSELF = {"serve"}  # its server handles SIGTERM
 _RESUMABLE = {"simulate", "prepare", "train", "compare", "resolution", "transfer"}
 
 
@@ -34,42 +31,13 @@ class Command(TyperCommand):
         super().format_options(ctx, formatter)
 
     def invoke(self, ctx: Any) -> Any:
-        """Run the command; an interrupt or a closed pipe ends it before typer handles them without a word."""
+        """Run the command; a signal or a closed pipe ends it before typer handles them without a word."""
         advice = "; run the same command again to continue" if self.name in _RESUMABLE else ""
         try:
-            with nullcontext() if self.name in _ENDS_ITSELF else _termination():
-                return super().invoke(ctx)
-        except KeyboardInterrupt:
-            _print_error(f"interrupted{advice}")
-            raise SystemExit(130) from None
-        except _Terminated:
-            _print_error(f"terminated{advice}")
-            raise SystemExit(TERMINATED) from None
+            return raise_in(lambda: super(Command, self).invoke(ctx), advice)
         except BrokenPipeError:
             _discard_output()
             raise SystemExit(CLOSED_PIPE) from None
-
-
-class _Terminated(BaseException):
-    """SIGTERM, raised in the main thread as KeyboardInterrupt is, so that files and workers are cleaned up."""
-
-
-@contextmanager
-def _termination() -> Iterator[None]:
-    """Raise `_Terminated` on the first SIGTERM; a second one ends the process at once."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-
-    def terminate(*_: object) -> None:
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)
-        raise _Terminated
-
-    before = signal.signal(signal.SIGTERM, terminate)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
 
 
 @contextmanager
