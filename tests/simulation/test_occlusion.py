@@ -55,7 +55,7 @@ def test_bins() -> None:
 def test_drawn_clutter_covers_all_bins_evenly() -> None:
     drawn = [draw_cluttered(Stream(0, index, "cluttered")) for index in range(32)]
     shares = []
-    for scene, viewpoint, openings, tries in drawn:
+    for scene, viewpoint, openings, tries, _ in drawn:
         assert 1 <= len(scene.items) <= 8
         assert 1 <= tries <= 150
         door_view = DoorView(scene, openings[0], viewpoint.camera_pose(), CAMERA)

@@ -10,10 +10,8 @@ from doorstate.simulation.occlusion import DoorView, occluded_bin
 from doorstate.simulation.presets import Preset, draw_rows
 from doorstate.simulation.render import Render, cut_range, render_behind_glass
 from doorstate.simulation.row import Row
-from doorstate.simulation.scene.box import Pose
 from doorstate.simulation.scene.scene import clutter_boxes
-from doorstate.simulation.true_door import VisiblePixels
-from doorstate.simulation.visibility import looks_into, opening_depth_m, same_image
+from doorstate.simulation.visibility import count_visible, opening_depths_m, same_image
 from doorstate.types import DepthImage, Part
 
 
@@ -29,7 +27,7 @@ def simulate_rows(
     frames = [replay(row) for row in rows]
     # Compared without noise: two states that differ in noise alone are still the same.
     clean = [cut_range(frame.full, row.camera) for row, frame in zip(rows, frames, strict=True)]
-    openings_m = _opening_depths_m(rows[0])
+    openings_m = opening_depths_m(rows[0].scene, rows[0].camera_pose(), rows[0].camera.intrinsics())
     described = []
     for row, frame, image in zip(rows, frames, clean, strict=True):
         columns: dict[str, object] = {
@@ -73,25 +71,12 @@ def _render_with(row: Row, sample: Row) -> Render:
     return cut_range(render_behind_glass(boxes, row.camera_pose(), row.camera.intrinsics()), row.camera)
 
 
-def _opening_depths_m(row: Row) -> list[DepthImage]:
-    """Return `opening_depth_m` of each door, first the main door."""
-    if row.scene.door is None:
-        return []
-    frames = [(row.scene.door, Pose(0.0, 0.0, 0.0))]
-    frames += [(placed.door, placed.pose(row.scene.near)) for placed in row.scene.other_doors or ()]
-    camera, intrinsics = row.camera_pose(), row.camera.intrinsics()
-    return [
-        opening_depth_m(camera.seen_from(pose), intrinsics, door.opening_width_m, door.opening_height_m)
-        for door, pose in frames
-    ]
-
-
 def _door_columns(row: Row, frame: Frame, openings_m: list[DepthImage]) -> dict[str, object]:
     if not openings_m:
         return {}
     ranges = row.box_groups().doors()
     main, *others = (
-        count_visible(frame, numbers, opening_m)
+        count_visible(frame.full, frame.cut, numbers, opening_m)
         for numbers, opening_m in zip(ranges, openings_m, strict=True)
     )
     share = 0.0
@@ -110,19 +95,3 @@ def _door_columns(row: Row, frame: Frame, openings_m: list[DepthImage]) -> dict[
             for door, seen in zip(row.other_doors, others, strict=True)
         ),
     }
-
-
-def count_visible(frame: Frame, numbers: range, opening_m: DepthImage) -> VisiblePixels:
-    """Count the pixels of a door.
-
-    Args:
-        frame: rendered sample.
-        numbers: numbers of the door's boxes.
-        opening_m: `opening_depth_m` of the door.
-    """
-    own = (frame.cut.box >= numbers.start) & (frame.cut.box < numbers.stop)
-    return VisiblePixels(
-        leaf=int((own & (frame.cut.part == Part.LEAF)).sum()),
-        frame=int((own & (frame.cut.part == Part.FRAME)).sum()),
-        opening=int(looks_into(frame.full.depth_m, opening_m).sum()),
-    )

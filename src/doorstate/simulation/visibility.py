@@ -12,7 +12,11 @@ from doorstate.io.camera import Intrinsics
 from doorstate.io.depth import depth_to_points
 from doorstate.simulation.camera import CameraPose
 from doorstate.simulation.frames import level
-from doorstate.types import DepthImage
+from doorstate.simulation.render import Render
+from doorstate.simulation.scene.box import Pose
+from doorstate.simulation.scene.scene import Scene
+from doorstate.simulation.true_door import VisiblePixels
+from doorstate.types import DepthImage, Part
 
 SAME_IMAGE_M = 1e-4
 
@@ -49,6 +53,35 @@ def opening_depth_m(pose: CameraPose, intrinsics: Intrinsics, width_m: float, he
         z = pose.z_m + reach * ray[..., 2]
         inside &= (reach > 0) & (z > 0) & (z < height_m)
     return np.where(inside, reach, np.float32(np.nan))
+
+
+def opening_depths_m(scene: Scene, pose: CameraPose, intrinsics: Intrinsics) -> list[DepthImage]:
+    """Return `opening_depth_m` of each door of a scene, first the main door; none without a door."""
+    if scene.door is None:
+        return []
+    frames = [(scene.door, Pose(0.0, 0.0, 0.0))]
+    frames += [(placed.door, placed.pose(scene.near)) for placed in scene.other_doors or ()]
+    return [
+        opening_depth_m(pose.seen_from(frame), intrinsics, door.opening_width_m, door.opening_height_m)
+        for door, frame in frames
+    ]
+
+
+def count_visible(full: Render, cut: Render, numbers: range, opening_m: DepthImage) -> VisiblePixels:
+    """Count the pixels of a door.
+
+    Args:
+        full: rendering before noise and range.
+        cut: rendering as the camera reports it.
+        numbers: numbers of the door's boxes.
+        opening_m: `opening_depth_m` of the door.
+    """
+    own = (cut.box >= numbers.start) & (cut.box < numbers.stop)
+    return VisiblePixels(
+        leaf=int((own & (cut.part == Part.LEAF)).sum()),
+        frame=int((own & (cut.part == Part.FRAME)).sum()),
+        opening=int(looks_into(full.depth_m, opening_m).sum()),
+    )
 
 
 def looks_into(depth_m: DepthImage, opening_m: DepthImage) -> NDArray[np.bool_]:

@@ -17,6 +17,7 @@ KIND_SHARES: dict[DoorKind, float] = {
     "glazed": 0.1,
     "full_glass": 0.1,
 }
+WALL_THICKNESS_M, WALL_HEIGHT_M = (0.08, 0.30), (2.4, 3.2)
 _HINGES: dict[Hinge, float] = {"left": 0.5, "right": 0.5}
 _SWINGS: dict[Swing, float] = {"towards": 0.5, "away": 0.5}
 _HANDLES: dict[HandleKind, float] = {"lever": 0.6, "knob": 0.2, "bar": 0.2}
@@ -24,12 +25,12 @@ _POCKET_CHANCE, _POCKET_CHEEKS_M = 0.3, 0.04
 _PIN_M = 0.005
 
 
-def draw_door(stream: Stream) -> Door:
-    """Draw a door in its wall."""
+def draw_door(stream: Stream, wall_m: tuple[float, float] | None = None) -> Door:
+    """Draw a door in its wall; thickness and height of the wall are drawn too unless they are given."""
     kind = stream.choice(KIND_SHARES)
     double = kind in ("double_equal", "double_unequal")
     hinge, swing = stream.choice(_HINGES), stream.choice(_SWINGS)
-    wall = stream.uniform(0.08, 0.30)
+    wall = wall_m[0] if wall_m else stream.uniform(*WALL_THICKNESS_M)
     leaf = stream.uniform(0.03, 0.04) if kind == "full_glass" else stream.uniform(0.035, 0.05)
     casing_thickness = stream.uniform(0.0, 0.025)
     slides = kind == "sliding"
@@ -47,7 +48,7 @@ def draw_door(stream: Stream) -> Door:
         opening_width_m=stream.uniform(1.25, 2.0) if double else stream.uniform(0.62, 1.05),
         opening_height_m=stream.choice({1.98: 1, 2.03: 1, 2.11: 1, stream.uniform(1.95, 2.25): 1}),
         wall_thickness_m=wall,
-        wall_height_m=stream.uniform(2.4, 3.2),
+        wall_height_m=wall_m[1] if wall_m else stream.uniform(*WALL_HEIGHT_M),
         leaf_thickness_m=leaf,
         leaf_recess_m=recess,
         # A flush leaf needs an offset pin to turn past its casing.

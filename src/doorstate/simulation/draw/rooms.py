@@ -6,7 +6,7 @@ from __future__ import annotations
 from doorstate.simulation.draw.stream import Stream
 from doorstate.simulation.scene.room import Space
 
-_BESIDE_M = 0.15  # least distance from the door or feature to a side wall
+BESIDE_M = 0.15  # least distance from the door or feature to a side wall
 _AROUND_ROBOT_M = 0.45
 
 
@@ -18,7 +18,7 @@ def draw_near(stream: Stream, half_width_m: float, robot_x_m: float, robot_y_m: 
     depth = robot_y_m + _AROUND_ROBOT_M + stream.uniform(0.0, 0.8 if kind == "corridor" else 2.5)
     if kind == "corridor":
         return Space(depth_m=round(depth, 4))
-    beside = half_width_m + _BESIDE_M
+    beside = half_width_m + BESIDE_M
     left = max(beside, robot_x_m + _AROUND_ROBOT_M) + stream.uniform(0.0, 2.0)
     right = max(beside, -robot_x_m + _AROUND_ROBOT_M) + stream.uniform(0.0, 2.0)
     return Space(left_m=round(left, 4), right_m=round(right, 4), depth_m=round(depth, 4))
@@ -32,5 +32,5 @@ def draw_far(stream: Stream, half_width_m: float) -> Space:
     depth = stream.uniform(1.5, 6.0)
     if kind == "corridor":
         return Space(depth_m=depth)
-    sides = (round(half_width_m + _BESIDE_M + stream.uniform(0.0, 2.5), 4) for _ in range(2))
+    sides = (round(half_width_m + BESIDE_M + stream.uniform(0.0, 2.5), 4) for _ in range(2))
     return Space(left_m=next(sides), right_m=next(sides), depth_m=depth)

@@ -27,9 +27,9 @@ from doorstate.simulation.scene.scene import Scene, clutter_boxes, room_boxes
 from doorstate.types import Part
 
 _SCENE_TRIES, _CLUTTER_TRIES = 60, 150
-_LEAST_FREE_DEG = 80
-_LEAF_TO_ROBOT_M, _ITEM_TO_ROBOT_M = 0.2, 0.3
-_MOST_ITEMS, _FEW_ITEMS = 8, 4
+LEAST_FREE_DEG = 80
+LEAF_TO_ROBOT_M, ITEM_TO_ROBOT_M = 0.2, 0.3
+_MOST_ITEMS, FEW_ITEMS = 8, 4
 
 
 class DrawnScene(NamedTuple):
@@ -64,15 +64,15 @@ def draw_cluttered(stream: Stream) -> DrawnScene:
         obstacles = [
             *fixed_boxes(door),
             *leaves,
-            *_walls(room_boxes(drawn.scene)),
-            viewpoint.robot_box(_ITEM_TO_ROBOT_M),
+            *solid(room_boxes(drawn.scene)),
+            viewpoint.robot_box(ITEM_TO_ROBOT_M),
         ]
         for number in range(1, _CLUTTER_TRIES + 1):
-            scene = _with_items(stream, drawn.scene, viewpoint, _MOST_ITEMS, obstacles)
+            scene = with_items(stream, drawn.scene, viewpoint, _MOST_ITEMS, obstacles)
             boxes = clutter_boxes(scene)
             if boxes and occluded_bin(view.occluded_share(boxes)) == target_bin:
                 return drawn._replace(scene=scene, clutter_tries=number)
-    raise _exhausted()
+    raise exhausted()
 
 
 def draw_no_door(stream: Stream) -> DrawnScene:
@@ -84,35 +84,34 @@ def draw_no_door(stream: Stream) -> DrawnScene:
         near = draw_near(stream, feature.width_m / 2, viewpoint.x_m, viewpoint.y_m)
         far = draw_far(stream, feature.width_m / 2) if feature.kind == "passage" else Space()
         scene = Scene(feature=feature, near=Space() if cornered else near, far=far)
-        walls = _walls([*feature_boxes(feature), *room_boxes(scene)])
-        robot = viewpoint.robot_box(_ITEM_TO_ROBOT_M)
+        walls = solid([*feature_boxes(feature), *room_boxes(scene)])
+        robot = viewpoint.robot_box(ITEM_TO_ROBOT_M)
         if collide([robot], walls):
             continue
         if stream.chance(0.5):
-            scene = _with_items(stream, scene, viewpoint, _FEW_ITEMS, [*walls, robot])
+            scene = with_items(stream, scene, viewpoint, FEW_ITEMS, [*walls, robot])
         return DrawnScene(scene, viewpoint, [Opening()])
-    raise _exhausted()
+    raise exhausted()
 
 
 def _draw_door_scene(stream: Stream, any_opening: bool) -> DrawnScene:
     for _ in range(_SCENE_TRIES):
         door = draw_door(stream)
         viewpoint = draw_viewpoint(stream)
-        half = door.opening_width_m / 2 + door.jamb_thickness_m + door.casing_width_m
-        near = draw_near(stream, half, viewpoint.x_m, viewpoint.y_m)
-        scene = Scene(door=door, near=near, far=draw_far(stream, half))
-        walls = _walls(room_boxes(scene))
-        free_deg = _free_deg(door, walls)
-        if free_deg < _LEAST_FREE_DEG:
+        near = draw_near(stream, door.half_width_m, viewpoint.x_m, viewpoint.y_m)
+        scene = Scene(door=door, near=near, far=draw_far(stream, door.half_width_m))
+        walls = solid(room_boxes(scene))
+        free_deg = turning_deg(door, walls)
+        if free_deg < LEAST_FREE_DEG:
             continue
         openings = (draw_any_openings if any_opening else draw_openings)(stream, door, free_deg)
-        robot = viewpoint.robot_box(_LEAF_TO_ROBOT_M)
+        robot = viewpoint.robot_box(LEAF_TO_ROBOT_M)
         if not any(collide([robot], leaf_boxes(door, opening)) for opening in openings):
             return DrawnScene(scene, viewpoint, openings)
-    raise _exhausted()
+    raise exhausted()
 
 
-def _free_deg(door: Door, walls: list[Box]) -> float:
+def turning_deg(door: Door, walls: list[Box]) -> float:
     """Return the free angle between walls; 180 for a sliding door that opens fully, 0 for one that does not."""
     if door.is_sliding:
         blocked = collide([*leaf_boxes(door, Opening(share=1.0)), *fixed_boxes(door)], walls)
@@ -120,15 +119,17 @@ def _free_deg(door: Door, walls: list[Box]) -> float:
     return free_angle_deg(door, walls)
 
 
-def _walls(boxes: list[Box]) -> list[Box]:
+def solid(boxes: list[Box]) -> list[Box]:
     """Return boxes without floor and ceiling, which items and robot touch by design."""
     return [box for box in boxes if box.part not in (Part.FLOOR, Part.CEILING)]
 
 
-def _with_items(stream: Stream, scene: Scene, viewpoint: Viewpoint, most: int, obstacles: list[Box]) -> Scene:
+def with_items(stream: Stream, scene: Scene, viewpoint: Viewpoint, most: int, obstacles: list[Box]) -> Scene:
+    """Return the scene with up to `most` items that touch nothing."""
     items = draw_items(stream, stream.integer(1, most), (viewpoint.x_m, viewpoint.y_m), scene.near, obstacles)
     return scene.model_copy(update={"items": items})
 
 
-def _exhausted() -> ConfigError:
+def exhausted() -> ConfigError:
+    """Return the error of a seed that gives no scene."""
     return ConfigError(f"no scene fits in {_SCENE_TRIES} tries", hint="use another seed", field="seed")

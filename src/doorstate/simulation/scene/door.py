@@ -46,6 +46,11 @@ class Door(FrozenModel):
     handle: Handle | None = None
 
     @property
+    def half_width_m(self) -> float:
+        """Half of the width with jambs and casing."""
+        return self.opening_width_m / 2 + self.jamb_thickness_m + self.casing_width_m
+
+    @property
     def is_double(self) -> bool:
         """True for a door with a second, passive leaf."""
         return self.kind in ("double_equal", "double_unequal")

@@ -1,0 +1,228 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Random scenes with several doors in view: corridors, and rooms with two doors."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from itertools import permutations
+from typing import NamedTuple
+
+from doorstate.simulation.camera import DepthCamera
+from doorstate.simulation.draw.doors import WALL_HEIGHT_M, WALL_THICKNESS_M, draw_door
+from doorstate.simulation.draw.layouts import Layout, WallDoor, draw_far_spaces
+from doorstate.simulation.draw.openings import draw_openings
+from doorstate.simulation.draw.scenes import (
+    FEW_ITEMS,
+    ITEM_TO_ROBOT_M,
+    LEAF_TO_ROBOT_M,
+    LEAST_FREE_DEG,
+    DrawnScene,
+    exhausted,
+    solid,
+    turning_deg,
+    with_items,
+)
+from doorstate.simulation.draw.stream import Stream
+from doorstate.simulation.draw.viewpoints import Viewpoint
+from doorstate.simulation.render import cut_range, render_behind_glass
+from doorstate.simulation.scene.box import Box, Pose
+from doorstate.simulation.scene.door import Opening
+from doorstate.simulation.scene.plan import collide
+from doorstate.simulation.scene.scene import Scene, box_groups, room_boxes
+from doorstate.simulation.true_door import remoteness_m
+from doorstate.simulation.visibility import count_visible, opening_depths_m
+
+_TRIES = 400
+_OFF_WALL_M = 0.45
+_MOST_BESIDE_NORMAL_DEG = 80.0
+_REACH_M = 4.8
+_LEAST_SEEN_PX = 1500  # of a door in view, in an image of 640 x 480
+_SMALL = DepthCamera(width=160, height=120)
+_PIXELS_PER_SMALL_PIXEL = 16
+_WALL_HALF_LENGTH_M = 8.0  # as long as the floor
+_DOOR_TRIES = 20
+
+
+class _Camera(NamedTuple):
+    """A camera in a layout."""
+
+    pose: Pose
+    height_m: float
+    pitch_deg: float
+    roll_deg: float
+
+    def viewpoint(self, frame: Pose) -> Viewpoint:
+        """Return the camera in the frame of a door."""
+        x, y, yaw = frame.inverse().after(self.pose)
+        heading = math.degrees(math.remainder(yaw, 2 * math.pi))
+        robot_angle = math.degrees(math.atan2(y, x))
+        return Viewpoint(
+            x_m=x,
+            y_m=y,
+            camera_height_m=self.height_m,
+            heading_deg=heading,
+            heading_rad=math.radians(heading),
+            heading_offset_deg=math.remainder(heading - robot_angle - 180, 360),
+            pitch_deg=self.pitch_deg,
+            roll_deg=self.roll_deg,
+            distance_m=math.hypot(x, y),
+            robot_angle_deg=robot_angle,
+        )
+
+
+def draw_corridor(stream: Stream) -> DrawnScene:
+    """Draw a corridor with two to four doors in its side walls, and sometimes one in its end, seen along it."""
+    count = stream.choice({2: 0.35, 3: 0.35, 4: 0.30})
+    for _ in range(_TRIES):
+        width = stream.uniform(1.3, 3.0)
+        behind, ahead = stream.uniform(0.7, 2.0), stream.uniform(2.5, 7.0)
+        has_wall = (True, stream.chance(0.6), True, stream.chance(0.5))
+        layout = Layout(round(behind + ahead, 4), width, has_wall)
+        walls_m = _draw_walls(stream)
+        for number in range(count):
+            # The first two doors stand on different sides.
+            wall = 2 * number if number < 2 else 2 * stream.integer(0, 1)
+            layout = _with_door(stream, layout, wall, walls_m[wall], (behind + 0.2, behind + _REACH_M))
+        if has_wall[1] and ahead <= _REACH_M and stream.chance(0.4):
+            layout = _with_door(stream, layout, 1, walls_m[1], (0.0, width))
+        heading = math.radians(stream.uniform(-45, 45))
+        pose = Pose(behind, stream.uniform(_OFF_WALL_M, width - _OFF_WALL_M), heading)
+        if len(layout.doors) >= count:
+            drawn = _draw_view(stream, layout, _draw_camera(stream, pose))
+            if drawn:
+                return drawn
+    raise exhausted()
+
+
+def draw_two_doors(stream: Stream) -> DrawnScene:
+    """Draw a room with two doors in view: in one wall (40 %), in walls that meet (35 %) or face each other (25 %)."""
+    walls = stream.choice({(0, 0): 0.40, (0, 1): 0.35, (0, 2): 0.25})
+    for _ in range(_TRIES):
+        length, width = stream.uniform(2.2, 6.0), stream.uniform(2.2, 6.0)
+        has_wall = tuple(wall in walls or stream.chance(0.85) for wall in range(4))
+        layout = Layout(length, width, (has_wall[0], has_wall[1], has_wall[2], has_wall[3]))
+        walls_m = _draw_walls(stream)
+        for wall in walls:
+            layout = _with_door(stream, layout, wall, walls_m[wall], (0.0, layout.wall_length_m(wall)))
+        if len(layout.doors) < 2:
+            continue
+        x, y = (stream.uniform(_OFF_WALL_M, side - _OFF_WALL_M) for side in (length, width))
+        first, second = (
+            math.atan2(frame.y_m - y, frame.x_m - x) for frame in map(layout.door_frame, range(2))
+        )
+        apart = math.remainder(second - first, 2 * math.pi)
+        heading = first + apart / 2 + math.radians(stream.uniform(-12, 12))
+        if abs(apart) < math.radians(65):
+            drawn = _draw_view(stream, layout, _draw_camera(stream, Pose(x, y, heading)))
+            if drawn:
+                return drawn
+    raise exhausted()
+
+
+def _draw_walls(stream: Stream) -> list[tuple[float, float]]:
+    """Draw the thickness of each wall and the height of all."""
+    height = stream.uniform(*WALL_HEIGHT_M)
+    return [(stream.uniform(*WALL_THICKNESS_M), height) for _ in range(4)]
+
+
+def _with_door(
+    stream: Stream, layout: Layout, wall: int, wall_m: tuple[float, float], along_m: tuple[float, float]
+) -> Layout:
+    """Return the layout with one more door in a wall, or without it if it does not fit."""
+    door = draw_door(stream, wall_m).model_copy(update={"wall_half_length_m": _WALL_HALF_LENGTH_M})
+    for _ in range(_DOOR_TRIES):
+        along = stream.uniform(*along_m)
+        # Walls are numbered around the room, so that the third runs against x.
+        candidate = WallDoor(wall, round(layout.length_m - along, 4) if wall == 2 else along, door)
+        if layout.fits(candidate):
+            return layout._replace(doors=(*layout.doors, candidate))
+    return layout
+
+
+def _draw_camera(stream: Stream, pose: Pose) -> _Camera:
+    return _Camera(pose, stream.uniform(0.25, 1.8), stream.uniform(-10, 10), stream.uniform(-2, 2))
+
+
+def _draw_view(stream: Stream, layout: Layout, camera: _Camera) -> DrawnScene | None:
+    """Draw openings and clutter, and choose the main door; None if fewer than two doors are in view or a leaf cannot turn."""
+    layout = draw_far_spaces(stream, layout)
+    main = _most_in_front(layout, camera)
+    if main is None:
+        return None
+    scene, viewpoint = layout.scene(main), camera.viewpoint(layout.door_frame(main))
+    openings = _draw_all_openings(stream, scene)
+    if openings is None:
+        return None
+    robot = viewpoint.robot_box(LEAF_TO_ROBOT_M)
+    walls = solid(room_boxes(scene))
+    moving: list[Box] = []
+    for own, others in openings:
+        groups = box_groups(scene, own, others)
+        doors = [solid(groups.main), *groups.other_doors]
+        if _touch(doors) or collide([robot], [box for boxes in (*doors, walls) for box in boxes]):
+            return None
+        moving += [box for boxes in doors for box in boxes]
+    if stream.chance(0.5):
+        obstacles = [*moving, *walls, viewpoint.robot_box(ITEM_TO_ROBOT_M)]
+        scene = with_items(stream, scene, viewpoint, FEW_ITEMS, obstacles)
+    mains, others_of = zip(*openings, strict=True)
+    return DrawnScene(scene, viewpoint, list(mains), other_openings=others_of)
+
+
+def _most_in_front(layout: Layout, camera: _Camera) -> int | None:
+    """Return the number of the door most in front of those in view; None if fewer than two are in view."""
+    remoteness = {}
+    seen = _seen_px(layout, camera)
+    for number in range(len(layout.doors)):
+        view = camera.viewpoint(layout.door_frame(number))
+        beside_deg = abs(math.remainder(view.robot_angle_deg - 90, 360))
+        if seen[number] >= _LEAST_SEEN_PX and beside_deg <= _MOST_BESIDE_NORMAL_DEG:
+            remoteness[number] = remoteness_m(view.distance_m, view.heading_offset_deg)
+    return min(remoteness, key=remoteness.__getitem__) if len(remoteness) >= 2 else None
+
+
+def _seen_px(layout: Layout, camera: _Camera) -> list[int]:
+    """Return the pixels that see each door, all closed, in an image of 640 x 480."""
+    scene, pose = layout.scene(0), camera.viewpoint(layout.door_frame(0)).camera_pose()
+    groups = box_groups(scene, Opening(), [Opening()] * (len(layout.doors) - 1))
+    intrinsics = _SMALL.intrinsics()
+    full = render_behind_glass(groups.all(), pose, intrinsics)
+    cut = cut_range(full, _SMALL)
+    openings_m = opening_depths_m(scene, pose, intrinsics)
+    seen = []
+    for numbers, opening_m in zip(groups.doors(), openings_m, strict=True):
+        px = count_visible(full, cut, numbers, opening_m)
+        seen.append(_PIXELS_PER_SMALL_PIXEL * (px.leaf + px.frame))
+    return seen
+
+
+def _draw_all_openings(stream: Stream, scene: Scene) -> list[tuple[Opening, tuple[Opening, ...]]] | None:
+    """Draw openings of all doors for three samples, each door in each state once; None if a leaf cannot turn."""
+    assert scene.door is not None
+    others = scene.other_doors or ()
+    frames = [Pose(0.0, 0.0, 0.0), *(placed.pose(scene.near) for placed in others)]
+    closed = box_groups(scene, Opening(), [Opening()] * len(others))
+    fixed = [solid(closed.main), *closed.other_doors]
+    drawn = []
+    for number, door in enumerate((scene.door, *(placed.door for placed in others))):
+        around = [*solid(closed.room), *(box for boxes in _others(fixed, number) for box in boxes)]
+        free_deg = turning_deg(door, frames[number].inverse().place(around))
+        if free_deg < LEAST_FREE_DEG:
+            return None
+        openings = draw_openings(stream, door, free_deg)
+        order = stream.choice(dict.fromkeys(permutations(range(3)), 1.0)) if number else range(3)
+        drawn.append([openings[position] for position in order])
+    return [(own, tuple(rest)) for own, *rest in zip(*drawn, strict=True)]
+
+
+def _touch(doors: list[list[Box]]) -> bool:
+    """Return True if parts of two doors collide."""
+    return any(
+        collide(boxes, [box for rest in _others(doors[:number], number) for box in rest])
+        for number, boxes in enumerate(doors)
+    )
+
+
+def _others(groups: list[list[Box]], number: int) -> Iterator[list[Box]]:
+    return (boxes for other, boxes in enumerate(groups) if other != number)
