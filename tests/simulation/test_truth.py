@@ -12,14 +12,9 @@ from doorstate.errors import DatasetError
 from doorstate.simulation.frames import replay
 from doorstate.simulation.generate import simulate_rows
 from doorstate.simulation.presets import PRESETS, draw_rows
-from doorstate.simulation.truth import TrueDoor, true_doors
+from doorstate.simulation.truth import true_doors
 from doorstate.types import Part
-
-
-def to_door_frame(points: np.ndarray, door: TrueDoor) -> np.ndarray:
-    yaw = math.radians(door.yaw_deg)
-    turn = np.array([[math.cos(yaw), math.sin(yaw), 0], [-math.sin(yaw), math.cos(yaw), 0], [0, 0, 1]])
-    return (points - (door.x_m, door.y_m, door.floor_z_m)) @ turn.T
+from tests.simulation.door_frame import to_door_frame
 
 
 @pytest.mark.parametrize(("preset", "index"), [("ogurob", 700), ("varied", 3), ("cluttered", 5)])

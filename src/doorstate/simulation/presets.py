@@ -18,6 +18,7 @@ from doorstate.simulation.draw.scenes import (
     draw_varied,
     draw_varied_angles,
 )
+from doorstate.simulation.draw.several_doors import draw_corridor, draw_two_doors
 from doorstate.simulation.draw.stream import Stream
 from doorstate.simulation.draw.viewpoints import Viewpoint
 from doorstate.simulation.row import Row
@@ -29,7 +30,15 @@ from doorstate.simulation.truth import main_columns
 from doorstate.types import NO_DOOR
 
 PresetName = Literal[
-    "ogurob", "ogurob-fixed", "ogurob-away", "varied", "varied-angles", "cluttered", "no-door"
+    "ogurob",
+    "ogurob-fixed",
+    "ogurob-away",
+    "varied",
+    "varied-angles",
+    "cluttered",
+    "no-door",
+    "corridor",
+    "two-doors",
 ]
 DEFAULT_SCENES = 1000
 
@@ -45,6 +54,8 @@ _SCENE_DRAWS: dict[PresetName, Callable[[Stream], DrawnScene]] = {
     "varied-angles": draw_varied_angles,
     "cluttered": draw_cluttered,
     "no-door": draw_no_door,
+    "corridor": draw_corridor,
+    "two-doors": draw_two_doors,
 }
 
 
@@ -87,6 +98,9 @@ def draw_rows(preset: Preset, seed: int, index: int) -> list[Row]:
     drawn = preset.draw(seed, index)
     pose_id = f"{preset.name}-{seed}-{index:05d}" if preset.has_many_scenes else f"p{index:04d}"
     scene, view = drawn.scene, drawn.viewpoint
+    others: list[tuple[OtherDoor, ...]] = [()] * len(drawn.openings)
+    if scene.other_doors:
+        others = [_other_doors(scene, openings, view) for openings in drawn.other_openings]
     row = Row(
         sample_id=f"{pose_id}-{NO_DOOR}",
         pose_id=pose_id,
@@ -105,24 +119,18 @@ def draw_rows(preset: Preset, seed: int, index: int) -> list[Row]:
         seed=seed,
         camera=preset.camera,
         scene=scene,
+        other_doors=others[0],
         clutter_tries=drawn.clutter_tries,
     )
-    door = scene.door
-    if door is None:
+    if scene.door is None:
         return [row]
-    by_angle = preset.name == "varied-angles"
+    camera = Pose(view.x_m, view.y_m, view.heading_rad)
     samples = []
     for number, opening in enumerate(drawn.openings):
-        camera = Pose(view.x_m, view.y_m, view.heading_rad)
-        columns = main_columns(describe_door(door, opening, camera, view.camera_height_m))
-        name = f"a{number}" if by_angle else columns["state"]
-        others = drawn.other_openings[number] if scene.other_doors else ()
-        samples.append(
-            row.model_copy(
-                update=columns
-                | {"sample_id": f"{pose_id}-{name}", "other_doors": _other_doors(scene, others, view)}
-            )
-        )
+        columns = main_columns(describe_door(scene.door, opening, camera, view.camera_height_m))
+        name = f"a{number}" if preset.name == "varied-angles" else columns["state"]
+        own = {"sample_id": f"{pose_id}-{name}", "other_doors": others[number]}
+        samples.append(row.model_copy(update=columns | own))
     return samples
 
 

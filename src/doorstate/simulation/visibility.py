@@ -13,8 +13,7 @@ from doorstate.io.depth import depth_to_points
 from doorstate.simulation.camera import CameraPose
 from doorstate.simulation.frames import level
 from doorstate.simulation.render import Render
-from doorstate.simulation.scene.box import Pose
-from doorstate.simulation.scene.scene import Scene
+from doorstate.simulation.scene.scene import Scene, door_frames
 from doorstate.simulation.true_door import VisiblePixels
 from doorstate.types import DepthImage, Part
 
@@ -59,11 +58,10 @@ def opening_depths_m(scene: Scene, pose: CameraPose, intrinsics: Intrinsics) -> 
     """Return `opening_depth_m` of each door of a scene, first the main door; none without a door."""
     if scene.door is None:
         return []
-    frames = [(scene.door, Pose(0.0, 0.0, 0.0))]
-    frames += [(placed.door, placed.pose(scene.near)) for placed in scene.other_doors or ()]
+    doors = [scene.door, *(placed.door for placed in scene.other_doors or ())]
     return [
         opening_depth_m(pose.seen_from(frame), intrinsics, door.opening_width_m, door.opening_height_m)
-        for door, frame in frames
+        for door, frame in zip(doors, door_frames(scene), strict=True)
     ]
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 from doorstate.simulation.draw.rooms import BESIDE_M, draw_far
@@ -16,7 +17,12 @@ from doorstate.simulation.scene.room import Space
 from doorstate.simulation.scene.scene import Scene
 
 _PARTITION_M = 0.1  # between the rooms behind two doors of one wall
-_ROLES: tuple[WallName, ...] = ("main", "left", "opposite", "right")  # of a wall, counted from the main door's
+_ROLES: tuple[WallName, ...] = (
+    "main",
+    "left",
+    "opposite",
+    "right",
+)  # of a wall, counted from the main door's
 
 
 class WallDoor(NamedTuple):
@@ -79,9 +85,7 @@ class Layout(NamedTuple):
             if number != main:
                 role = (other.wall - door.wall) % 4
                 along_m = round(other.along_m - zero_m[role], 4)
-                others.append(
-                    PlacedDoor(door=other.door, wall=_ROLES[role], along_m=along_m, far=other.far)
-                )
+                others.append(PlacedDoor(door=other.door, wall=_ROLES[role], along_m=along_m, far=other.far))
         left, opposite, right = (self.has_wall[(door.wall + turn) % 4] for turn in (1, 2, 3))
         near = Space(
             left_m=round(length - door.along_m, 4) if left else None,
@@ -112,14 +116,16 @@ def _draw_row_of_spaces(stream: Stream, doors: Sequence[WallDoor]) -> list[Space
     if kind != "rooms":
         shared = Space(depth_m=stream.uniform(1.5, 6.0)) if kind == "corridor" else Space()
         return [shared, *(Space() for _ in doors[1:])]
-    ends_m = [-math.inf, *((a.along_m + b.along_m) / 2 for a, b in zip(doors, doors[1:], strict=False)), math.inf]
+    ends_m = [
+        -math.inf,
+        *((a.along_m + b.along_m) / 2 for a, b in pairwise(doors)),
+        math.inf,
+    ]
     spaces = []
-    for door, low, high in zip(doors, ends_m, ends_m[1:], strict=False):
+    for door, (low, high) in zip(doors, pairwise(ends_m), strict=True):
         right, left = (
             min(door.half_m + stream.uniform(0.0, 2.5), distance - _PARTITION_M / 2)
             for distance in (door.along_m - low, high - door.along_m)
         )
-        spaces.append(
-            Space(left_m=round(left, 4), right_m=round(right, 4), depth_m=stream.uniform(1.5, 6.0))
-        )
+        spaces.append(Space(left_m=round(left, 4), right_m=round(right, 4), depth_m=stream.uniform(1.5, 6.0)))
     return spaces

@@ -19,7 +19,7 @@ from doorstate.simulation.occlusion import BINS, DoorView, occluded_bin
 from doorstate.simulation.scene.box import Box
 from doorstate.simulation.scene.clearance import free_angle_deg
 from doorstate.simulation.scene.door import Door, Opening
-from doorstate.simulation.scene.door_boxes import fixed_boxes, leaf_boxes
+from doorstate.simulation.scene.door_boxes import fixed_boxes, frame_and_leaf_boxes, leaf_boxes
 from doorstate.simulation.scene.feature import feature_boxes
 from doorstate.simulation.scene.plan import collide
 from doorstate.simulation.scene.room import Space
@@ -114,7 +114,7 @@ def _draw_door_scene(stream: Stream, any_opening: bool) -> DrawnScene:
 def turning_deg(door: Door, walls: list[Box]) -> float:
     """Return the free angle between walls; 180 for a sliding door that opens fully, 0 for one that does not."""
     if door.is_sliding:
-        blocked = collide([*leaf_boxes(door, Opening(share=1.0)), *fixed_boxes(door)], walls)
+        blocked = collide(frame_and_leaf_boxes(door, Opening(share=1.0)), walls)
         return 0.0 if blocked else 180.0
     return free_angle_deg(door, walls)
 
@@ -130,6 +130,6 @@ def with_items(stream: Stream, scene: Scene, viewpoint: Viewpoint, most: int, ob
     return scene.model_copy(update={"items": items})
 
 
-def exhausted() -> ConfigError:
+def exhausted(tries: int = _SCENE_TRIES) -> ConfigError:
     """Return the error of a seed that gives no scene."""
-    return ConfigError(f"no scene fits in {_SCENE_TRIES} tries", hint="use another seed", field="seed")
+    return ConfigError(f"no scene fits in {tries} tries", hint="use another seed", field="seed")

@@ -10,7 +10,7 @@ from typing import NamedTuple, Self
 from pydantic import Field, model_validator
 
 from doorstate._models import FrozenModel
-from doorstate.simulation.scene.box import Box
+from doorstate.simulation.scene.box import Box, Pose
 from doorstate.simulation.scene.clutter import Item, item_boxes
 from doorstate.simulation.scene.door import Door, Opening
 from doorstate.simulation.scene.door_boxes import door_boxes
@@ -109,6 +109,11 @@ def box_groups(scene: Scene, opening: Opening, other_openings: Sequence[Opening]
         placed_door_boxes(placed, own, scene.near) for placed, own in zip(others, other_openings, strict=True)
     ]
     return BoxGroups(main, room_boxes(scene), other_boxes, clutter_boxes(scene))
+
+
+def door_frames(scene: Scene) -> list[Pose]:
+    """Return the frames of all doors in that of the main door, which comes first."""
+    return [Pose(0.0, 0.0, 0.0), *(placed.pose(scene.near) for placed in scene.other_doors or ())]
 
 
 def scene_boxes(scene: Scene, opening: Opening, other_openings: Sequence[Opening] = ()) -> list[Box]:
