@@ -109,6 +109,30 @@ def graphs(
 
 
 @app.command()
+def finder(
+    folder: Annotated[Path, typer.Option(help="Folder of the simulated walls.")] = Path("data/finder"),
+    share: Annotated[float, typer.Option(min=0.001, max=1, help="Share of the scenes.")] = 1.0,
+    steps: Annotated[int, typer.Option(min=1, help="Steps of the training.")] = 12_000,
+    out: Annotated[Path | None, typer.Option(help="ONNX file; that of the package if not given.")] = None,
+) -> None:
+    """Simulate walls, and train the network that finds doorways on them."""
+    from importlib.resources import files
+
+    from doorstate.cli.progress import progress_bar
+
+    from .finder.samples import make_samples
+    from .finder.train import export_scorer, train_scorer
+
+    with progress_bar("Simulating") as progress:
+        samples = make_samples(folder, share, progress=progress)
+    with progress_bar("Training") as progress:
+        network = train_scorer(samples, steps, progress=progress)
+    path = out or Path(str(files("doorstate.doorways"))) / "column_scorer.onnx"
+    export_scorer(network, path)
+    print(f"{path}: {path.stat().st_size / 1e3:.0f} kB")
+
+
+@app.command()
 def frames(
     recordings: Annotated[Path, typer.Argument(help="Folder of recorded frames with an index.csv.")],
 ) -> None:

@@ -15,7 +15,7 @@ from doorstate.clouds.measured import is_measured
 from doorstate.doorways.column_scorer import ColumnScores, score_columns
 from doorstate.doorways.cues import find_cues
 from doorstate.doorways.doorway import Doorway
-from doorstate.doorways.elevation import COLUMN_M, wall_elevation
+from doorstate.doorways.elevation import COLUMN_M, Elevation, wall_elevation
 from doorstate.doorways.plan_lines import Floats, angle_deg
 from doorstate.doorways.walls import Wall, find_walls
 from doorstate.types import Points
@@ -38,7 +38,7 @@ class FinderSettings(FrozenModel):
     """
 
     most: int = Field(default=8, ge=1, le=100)
-    min_score: float = Field(default=0.02, ge=0, le=1)
+    min_score: float = Field(default=0.05, ge=0, le=1)
     width_m: tuple[float, float] = (0.6, 2.4)
 
 
@@ -58,15 +58,23 @@ def find_doorways(
     points = thinned(cloud)
     if len(points) == 0:
         return []
-    floor_m = float(np.quantile(points[:, 2], _LOWEST_SHARE)) if floor_z_m is None else floor_z_m
-    height_m = points[:, 2] - np.float32(floor_m)
-    upright = points[(height_m > _UPRIGHT_M[0]) & (height_m < _UPRIGHT_M[1])].astype(np.float64)
-    found = [doorway for wall in find_walls(upright) for doorway in _on_wall(wall, points, floor_m, settings)]
+    floor_m = _floor_m(points) if floor_z_m is None else floor_z_m
+    found = [
+        doorway
+        for wall, elevation in _survey(points, floor_m)
+        for doorway in _on_wall(wall, elevation, floor_m, settings)
+    ]
     distinct: list[Doorway] = []
     for doorway in sorted(found, key=lambda candidate: -candidate.score):
         if not any(_are_one(doorway, better) for better in distinct):
             distinct.append(doorway)
     return distinct[: settings.most]
+
+
+def surveyed_walls(cloud: Points, floor_z_m: float) -> list[tuple[Wall, Elevation]]:
+    """Return the walls of a cloud with their elevations; arguments are those of `find_doorways`."""
+    points = thinned(cloud)
+    return _survey(points, floor_z_m) if len(points) else []
 
 
 def thinned(cloud: Points) -> NDArray[np.float32]:
@@ -77,10 +85,17 @@ def thinned(cloud: Points) -> NDArray[np.float32]:
     return np.asarray(points[:: max(1, len(points) // _MAX_POINTS)], dtype=np.float32)
 
 
-def _on_wall(
-    wall: Wall, points: NDArray[np.float32], floor_m: float, settings: FinderSettings
-) -> Iterator[Doorway]:
-    elevation = wall_elevation(wall, points, floor_m)
+def _floor_m(points: NDArray[np.float32]) -> float:
+    return float(np.quantile(points[:, 2], _LOWEST_SHARE))
+
+
+def _survey(points: NDArray[np.float32], floor_m: float) -> list[tuple[Wall, Elevation]]:
+    height_m = points[:, 2] - np.float32(floor_m)
+    upright = points[(height_m > _UPRIGHT_M[0]) & (height_m < _UPRIGHT_M[1])].astype(np.float64)
+    return [(wall, wall_elevation(wall, points, floor_m)) for wall in find_walls(upright)]
+
+
+def _on_wall(wall: Wall, elevation: Elevation, floor_m: float, settings: FinderSettings) -> Iterator[Doorway]:
     scores = score_columns(elevation, wall.distance_m)
     for peak in _peaks(scores.middles.probability, settings.min_score):
         right_m, left_m = _ends(scores, peak)
