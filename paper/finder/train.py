@@ -100,9 +100,7 @@ def export_scorer(network: ColumnNetwork, path: Path) -> None:
         temporary.write_bytes(content.getvalue())
 
 
-def _mirror(
-    cells: NDArray[np.float32], columns: NDArray[np.float32], targets: NDArray[np.float32]
-) -> None:
+def _mirror(cells: NDArray[np.float32], columns: NDArray[np.float32], targets: NDArray[np.float32]) -> None:
     for array in (cells, columns, targets):
         array[:] = array[::-1].copy()
     columns[:, 1] *= -1
