@@ -70,6 +70,21 @@ def ghosts(
 
 
 @app.command()
+def doorways(
+    out: Out = Path("docs/benchmarks"),
+    scenes: Annotated[int, typer.Option(help="Scenes of each preset and sensor.", min=1)] = 50,
+) -> None:
+    """Count doors of simulated frames that are among the candidate doorways."""
+    from doorstate.cli.progress import progress_bar
+
+    from .doorways import doorways_table, measure_doorways
+
+    with progress_bar("doorways") as progress:
+        doors, frames = measure_doorways(scenes, progress)
+    _write((doorways_table(doors, frames),), out / "doorways.md", scenes=scenes)
+
+
+@app.command()
 def thinning(out: Out = Path("docs/benchmarks"), network: Network = "pointnet2", count: Count = 300) -> None:
     """Compare predictions and times of sampling from a part of the points with those from all points."""
     from doorstate.cli.progress import progress_bar
