@@ -32,7 +32,7 @@ class Augmentation(FrozenModel):
     """Ranges of random changes; the defaults change nothing. Lengths are in units of the normalised cloud."""
 
     yaw_deg: float = Field(default=0.0, ge=0, le=180)  # rotated about z by U(-yaw, yaw)
-    mirror: float = Field(default=0.0, ge=0, le=1)  # probability of y -> -y
+    mirror: float = Field(default=0.0, ge=0, le=1)  # probability of left and right exchanged
     scale: _Range = (1.0, 1.0)  # x, y and z alike, unless scale_z is set
     scale_z: _Range | None = None
     shift: float = Field(default=0.0, ge=0, le=100)  # per axis U(-shift, shift)
@@ -60,7 +60,7 @@ class AugmentationDraw(NamedTuple):
 
 
 def draw_augmentation(
-    augmentation: Augmentation, rng: np.random.Generator, clouds: int, points: int
+    augmentation: Augmentation, rng: np.random.Generator, clouds: int, points: int, across: int = 1
 ) -> AugmentationDraw:
     """Draw the changes of one batch.
 
@@ -69,6 +69,7 @@ def draw_augmentation(
         rng: random generator.
         clouds: B, number of clouds.
         points: N, points of each cloud.
+        across: axis that points left, 0 or 1, which a mirrored cloud is reversed along.
     """
     yaw = rng.uniform(-1, 1, clouds) * math.radians(augmentation.yaw_deg)
     tilt_sigma = math.radians(augmentation.tilt_deg)
@@ -77,7 +78,8 @@ def draw_augmentation(
     scale_z = scale if augmentation.scale_z is None else rng.uniform(*augmentation.scale_z, clouds)
     mirror = np.where(rng.random(clouds) < augmentation.mirror, -1.0, 1.0)
     stretch = np.zeros((clouds, 3, 3))
-    stretch[:, 0, 0], stretch[:, 1, 1], stretch[:, 2, 2] = scale, scale * mirror, scale_z
+    stretch[:, 0, 0], stretch[:, 1, 1], stretch[:, 2, 2] = scale, scale, scale_z
+    stretch[:, across, across] *= mirror
     linear = _rotation(yaw, 2) @ _rotation(tilt[:, 0], 0) @ _rotation(tilt[:, 1], 1) @ stretch
     shift = rng.uniform(-1, 1, (clouds, 1, 3)) * augmentation.shift
     jitter = None

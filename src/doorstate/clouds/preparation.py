@@ -76,12 +76,17 @@ def prepare_cloud(
     if spec.remove_outliers:
         cloud = remove_outliers(cloud).points
     rows, clean = _candidates(cloud, spec)
-    sampled = farthest_point_indices(clean, min(spec.num_points, len(clean)), sampler)
-    # Sampling repeats a point only after all distinct ones, so the repeats are at the end.
-    sampled = sampled[: len(np.unique(sampled))]
+    sampled = distinct_farthest_points(clean, spec.num_points, sampler)
     if len(sampled) < min(spec.num_points, MIN_POINTS):
-        raise _too_few(f"{len(sampled)} distinct of {len(clean)} measured")
+        raise too_few_points(f"{len(sampled)} distinct of {len(clean)} measured")
     return PreparedCloud(clean[sampled], rows[sampled])
+
+
+def distinct_farthest_points(points: Points, count: int, sampler: Sampler | None = None) -> Indices:
+    """Return the indices of at most `count` points (N, 3) in farthest-point order, each distinct point once."""
+    sampled = farthest_point_indices(points, min(count, len(points)), sampler)
+    # Sampling repeats a point only after all distinct ones, so the repeats are at the end.
+    return sampled[: len(np.unique(sampled))]
 
 
 def _candidates(cloud: Points, spec: CloudSpec) -> tuple[Indices, Points]:
@@ -114,7 +119,7 @@ def _measured_rows(flat: Points) -> Indices:
             raise TooFewPointsError("nothing was measured: all points are NaN or infinite")
         raise TooFewPointsError("nothing was measured: all points lie at the origin")
     if len(measured) < MIN_POINTS:
-        raise _too_few(f"{len(measured)} measured")
+        raise too_few_points(f"{len(measured)} measured")
     return measured
 
 
@@ -122,11 +127,16 @@ def _near_points(clean: Points, max_depth_m: float) -> NDArray[np.bool_]:
     near: NDArray[np.bool_] = clean[:, 0] <= max_depth_m
     if near.sum() < MIN_POINTS:
         median_m = median_range_m(clean)
-        raise _too_few(
+        raise too_few_points(
             f"{near.sum()} within {max_depth_m:g} m ahead, and half of all more than {median_m:.1f} m away"
         )
     return near
 
 
-def _too_few(counts: str) -> TooFewPointsError:
+def too_few_points(counts: str) -> TooFewPointsError:
+    """Return the error of a cloud that is too small for a network.
+
+    Args:
+        counts: what there is, such as "3 measured".
+    """
     return TooFewPointsError(f"too few points: {counts}", expected=f"at least {MIN_POINTS}")

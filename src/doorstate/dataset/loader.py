@@ -17,7 +17,7 @@ from doorstate.clouds.augmentation import (
     apply_augmentation,
     draw_augmentation,
 )
-from doorstate.clouds.normalization import centroids, normalize
+from doorstate.clouds.normalization import Placement
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import ConfigError
 from doorstate.networks.heads import IGNORE_INDEX, POINT_HEADS, augment_targets, head_targets
@@ -50,10 +50,10 @@ def check_states(dataset: PreparedDataset, sample_ids: Sequence[str], heads: Seq
 
 
 class _Loaded(NamedTuple):
-    """Points (M, n, 3), centroids (M, 3) in metres, labels (M,), targets by head, and parts of M samples."""
+    """Points (M, n, 3), their placement, labels (M,), targets by head, and parts of M samples."""
 
     points: np.ndarray
-    centroids: np.ndarray
+    placement: Placement
     labels: np.ndarray
     targets: dict[str, np.ndarray]
     parts: np.ndarray | None  # (M, n)
@@ -90,7 +90,9 @@ class CloudLoader:
         self.sample_ids = [sample for _, samples in selected for sample in samples]
         loaded = [_load(source, samples, num_points, heads) for source, samples in selected]
         self._points = _concatenate([samples.points for samples in loaded])
-        self.centroids = _concatenate([samples.centroids for samples in loaded])  # (M, 3) metres
+        self._normalization = dataset.normalization
+        centres = _concatenate([samples.placement.centres for samples in loaded])
+        self.placement = Placement(centres, self._normalization.scale_m)
         self._labels = _concatenate([samples.labels for samples in loaded])
         self._targets = {
             name: _concatenate([samples.targets[name] for samples in loaded]) for name in loaded[0].targets
@@ -129,7 +131,7 @@ class CloudLoader:
         batch_size = min(batch_size, len(order))
         num_points = self._points.shape[1]
         for number, start in enumerate(range(0, len(order) - batch_size + 1, batch_size)):
-            draw = draw_augmentation(augmentation, rng, batch_size, num_points)
+            draw = draw_augmentation(augmentation, rng, batch_size, num_points, self._normalization.across)
             if number >= skip:
                 yield self._batch(order[start : start + batch_size], draw)
 
@@ -163,12 +165,12 @@ def _load(
     indices = np.array([dataset.index_of(sample) for sample in sample_ids], dtype=np.int64)
     # A prefix of a farthest-point order is the farthest-point sample of that size.
     points = dataset.clouds[indices, :num_points]
-    centroids_m = centroids(points)
     check_states(dataset, sample_ids, heads)
     labels = np.where(dataset.labels[indices] < len(STATES), dataset.labels[indices], IGNORE_INDEX)
-    targets = head_targets([dataset.rows[index] for index in indices], centroids_m, heads)
+    placement = dataset.normalization.placement(points)
+    targets = head_targets([dataset.rows[index] for index in indices], placement, heads)
     parts = dataset.parts_of(indices, num_points) if PARTS in heads else None
-    return _Loaded(normalize(points), centroids_m, labels, targets, parts)
+    return _Loaded(dataset.normalization(points), placement, labels, targets, parts)
 
 
 class _NeighbourCache:

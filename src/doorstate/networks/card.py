@@ -11,7 +11,7 @@ from pydantic import Field, ValidationError
 from doorstate import __version__
 from doorstate._documents import parse_json
 from doorstate._models import FrozenModel, Name
-from doorstate.clouds.normalization import SCALE_M
+from doorstate.clouds.normalization import NORMALIZATIONS, SCALE_M, Input, Normalization
 from doorstate.clouds.preparation import MAX_NUM_POINTS, CloudSpec
 from doorstate.errors import WeightsError, first_validation_error
 from doorstate.types import STATES
@@ -30,6 +30,7 @@ class WeightsCard(FrozenModel):
     # Per cloud in use, if fewer are as good.
     default_points: int | None = Field(default=None, ge=1, le=MAX_NUM_POINTS)
     heads: tuple[str, ...] = ()  # besides the state, by name (networks.heads)
+    input: Input = "whole"
     scale_m: float = Field(default=SCALE_M, gt=0)
     states: tuple[str, ...] = STATES
     max_depth_m: float | None = Field(default=None, gt=0)  # range of the camera of the training clouds
@@ -55,6 +56,11 @@ class WeightsCard(FrozenModel):
             return cls.model_validate(content)
         except ValidationError as error:
             raise WeightsError(first_validation_error(error)) from error
+
+    @property
+    def normalization(self) -> Normalization:
+        """Normalisation of the network's clouds."""
+        return NORMALIZATIONS[self.input]
 
     @property
     def points_in_use(self) -> int:

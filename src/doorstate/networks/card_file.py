@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from doorstate.clouds.normalization import SCALE_M
 from doorstate.errors import WeightsError
 from doorstate.networks.card import CARD_KEY, WeightsCard
 from doorstate.networks.tensor_file import read_header
@@ -32,5 +31,5 @@ def check_card(card: WeightsCard, path: Path) -> None:
     Raises:
         WeightsError: it is for others.
     """
-    if card.states != STATES or card.scale_m != SCALE_M:
+    if card.states != STATES or card.scale_m != card.normalization.scale_m:
         raise WeightsError(f"made for states {card.states} at scale {card.scale_m} m", path=path)

@@ -160,7 +160,7 @@ def evaluate_run(
         write_predictions(path, samples, outputs.labels[mask], outputs.probabilities[mask])
         metrics |= {f"{role}_macro_f1": outputs.macro_f1, f"{role}_accuracy": outputs.accuracy}
         if role == "test" and outputs.head_values:
-            columns = head_columns(outputs.head_values, loader.centroids)
+            columns = head_columns(outputs.head_values, loader.placement)
             write_head_outputs(run.head_outputs, data.samples[role], columns)
         if role == "test" and outputs.part_counts is not None:
             metrics["test_part_counts"] = outputs.part_counts.tolist()

@@ -23,7 +23,7 @@ class CloudOutputs(NamedTuple):
     """Outputs of a network for one cloud."""
 
     probabilities: NDArray[np.float32]  # (3,)
-    heads: Mapping[str, float]  # by column of the manifest, metres and degrees in the sensor frame
+    heads: Mapping[str, float]  # by column of the manifest, metres and degrees in the frame of the cloud
 
     def are_valid(self) -> bool:
         """Return True for finite numbers, among them probabilities of which those of the states sum to one."""
@@ -37,7 +37,7 @@ class Outputs(NamedTuple):
     """Outputs of a network for a batch of clouds."""
 
     probabilities: NDArray[np.float32]  # (B, 3), calibrated
-    heads: Columns  # (B,) each, by column of the manifest, metres and degrees in the sensor frame
+    heads: Columns  # (B,) each, by column of the manifest, metres and degrees in the frame of the clouds
     withheld: NDArray[np.bool_] | None = None  # (B,) True where an exported network gives NaN for heads
 
     def per_cloud(self) -> list[CloudOutputs]:
@@ -72,7 +72,7 @@ class Backend(Protocol):
         """Run the network.
 
         Args:
-            points: (B, n, 3) metres, sensor frame, each cloud in farthest-point order.
+            points: (B, n, 3) metres, each cloud in farthest-point order and in the frame of the card's input.
         """
 
 

@@ -6,7 +6,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from doorstate.clouds.normalization import centroids
 from doorstate.errors import WeightsError, summarize_exception
 from doorstate.inference.backends.base import Outputs
 from doorstate.inference.backends.threads import default_threads
@@ -61,7 +60,8 @@ class OnnxBackend:
         """Run the network on (B, n, 3) metres in farthest-point order, n as in `num_points`."""
         names = [RAW_PROBABILITIES, *self._heads, REASON] if self._refuses else [PROBABILITIES, *self._heads]
         probabilities, *others = self._session.run(names, {INPUT: points})
-        columns = head_columns(dict(zip(self._heads, others, strict=False)), centroids(points))
+        values = dict(zip(self._heads, others, strict=False))
+        columns = head_columns(values, self.card.normalization.placement(points))
         return Outputs(probabilities, columns, others[-1] != 0 if self._refuses else None)
 
 

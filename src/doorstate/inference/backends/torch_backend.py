@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import torch
 
-from doorstate.clouds.normalization import centroids, normalize
 from doorstate.inference.backends.base import Outputs
 from doorstate.networks.base import PointNetwork
 from doorstate.networks.card import WeightsCard
@@ -31,10 +30,10 @@ class TorchBackend:
     def __call__(self, points: Points) -> Outputs:
         """Run the network on (B, n, 3) metres in farthest-point order."""
         dtype = next(self.network.parameters()).dtype
+        normalization = self.card.normalization
         with torch.inference_mode():
-            outputs = head_outputs(
-                self.network, torch.from_numpy(normalize(points)).to(dtype), with_points=False
-            )
+            normalized = torch.from_numpy(normalization(points)).to(dtype)
+            outputs = head_outputs(self.network, normalized, with_points=False)
             probabilities = (outputs.pop(STATE) / self.card.temperature).softmax(1).numpy()
         heads = {name: values.numpy() for name, values in outputs.items()}
-        return Outputs(probabilities, head_columns(heads, centroids(points)))
+        return Outputs(probabilities, head_columns(heads, normalization.placement(points)))

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import torch
 from torch import Tensor, nn
 
-from doorstate.clouds.normalization import SCALE_M
 from doorstate.inference.backends.onnx_backend import (
     INPUT,
     PROBABILITIES,
@@ -38,11 +37,16 @@ class _MetresToProbabilities(nn.Module):
         super().__init__()
         self.network = network
         self.temperature = card.temperature
+        self.scale_m = card.normalization.scale_m
+        self.centre_m = card.normalization.centre_m
 
     def forward(self, points: Tensor) -> tuple[Tensor, ...]:
-        # Bit for bit as clouds.normalization.normalize: a point just inside a ball must not be just outside.
-        centroid = points.mean(1, keepdim=True, dtype=torch.float64).to(torch.float32)
-        outputs = head_outputs(self.network, (points - centroid) / SCALE_M, with_points=False)
+        # Bit for bit as clouds.normalization: a point just inside a ball must not be just outside.
+        if self.centre_m is None:
+            centre = points.mean(1, keepdim=True, dtype=torch.float64).to(torch.float32)
+        else:
+            centre = torch.tensor(self.centre_m, dtype=torch.float32)
+        outputs = head_outputs(self.network, (points - centre) / self.scale_m, with_points=False)
         return ((outputs.pop(STATE) / self.temperature).softmax(1), *outputs.values())
 
 

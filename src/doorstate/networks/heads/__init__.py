@@ -2,9 +2,9 @@
 """Heads: outputs of a network besides the state. Imports no torch.
 
 The numbers of a head have three forms. *Outputs* leave its last linear layer. *Values* are decoded outputs, and
-targets, in the network's units and axes: clouds are centred and divided by 3 m (clouds.normalization.normalize), angles
-are in radians. *Columns* are values in metres and degrees in the sensor frame, named as in tables. NaN is a number
-that the manifest does not hold.
+targets, in the network's units and axes: clouds are centred and scaled (clouds.normalization), angles are in radians.
+*Columns* are values in metres and degrees in the frame of the cloud, named as in tables. NaN is a number that the
+manifest does not hold.
 
 A new head is one `HeadSpec` in a file of its own, entered in `HEADS`.
 """
@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from doorstate.clouds.augmentation import AugmentationDraw
+from doorstate.clouds.normalization import Placement
 from doorstate.networks.heads.angle import ANGLE_HEAD
 from doorstate.networks.heads.door import DOOR_HEAD
 from doorstate.networks.heads.frame import FRAME_HEAD
@@ -34,7 +35,6 @@ from doorstate.networks.heads.spec import (
     Values,
 )
 from doorstate.networks.heads.widths import WIDTHS_HEAD
-from doorstate.types import Points
 
 __all__ = ["HEADS", "IGNORE_INDEX", "POINT_HEADS", "STATE", "Column", "HeadSpec", "Metric", "PointHeadSpec"]
 
@@ -49,16 +49,16 @@ IGNORE_INDEX = -100
 
 
 def head_targets(
-    rows: Sequence[ManifestRow], centroids: Points, heads: Sequence[str] = tuple(HEADS)
+    rows: Sequence[ManifestRow], placement: Placement, heads: Sequence[str] = tuple(HEADS)
 ) -> dict[str, Values]:
     """Return (M, num_values) targets by head.
 
     Args:
         rows: M lines of a manifest.
-        centroids: (M, 3) means of the clouds, in metres.
+        placement: of their clouds.
         heads: names; those without an entry in `HEADS` are skipped.
     """
-    return {name: HEADS[name].target(rows, centroids) for name in heads if name in HEADS}
+    return {name: HEADS[name].target(rows, placement) for name in heads if name in HEADS}
 
 
 def augment_targets(targets: Mapping[str, Values], draw: AugmentationDraw | None) -> dict[str, Values]:
@@ -68,17 +68,17 @@ def augment_targets(targets: Mapping[str, Values], draw: AugmentationDraw | None
     return {name: HEADS[name].augment(target, draw).astype(np.float32) for name, target in targets.items()}
 
 
-def head_columns(values: Mapping[str, NDArray[np.floating]], centroids: Points) -> Columns:
-    """Return (M,) numbers in metres and degrees in the sensor frame, by column name.
+def head_columns(values: Mapping[str, NDArray[np.floating]], placement: Placement) -> Columns:
+    """Return (M,) numbers in metres and degrees in the frame of the clouds, by column name.
 
     Args:
         values: (M, num_values) decoded outputs by head.
-        centroids: (M, 3) means of the clouds, in metres.
+        placement: of the M clouds.
     """
     columns: Columns = {}
     for name, head in HEADS.items():
         if name in values:
-            numbers = head.to_columns(values[name].astype(np.float64), centroids)
+            numbers = head.to_columns(values[name].astype(np.float64), placement)
             columns |= zip(head.column_names, numbers.T, strict=True)
     return columns
 

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from doorstate.clouds.normalization import Placement
 from doorstate.networks.heads.shared import angle_error_deg, direction_loss, mean
 from doorstate.networks.heads.spec import Column, Floats, HeadSpec, Metric, States
-from doorstate.types import Points
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -19,11 +19,11 @@ def _decode(outputs: Tensor) -> Tensor:
     return outputs[:, 1].atan2(outputs[:, 0]).unsqueeze(1)
 
 
-def _to_values(columns: Floats, centroids: Points) -> Floats:
+def _to_values(columns: Floats, placement: Placement) -> Floats:
     return np.radians(columns)
 
 
-def _to_columns(values: Floats, centroids: Points) -> Floats:
+def _to_columns(values: Floats, placement: Placement) -> Floats:
     """Convert to degrees and to the nearest angle that a door can have, 0 to 180: a direction can be any."""
     angle_deg = np.degrees(values)
     return np.where(angle_deg < 0, np.where(angle_deg < -90, 180.0, 0.0), angle_deg)

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from doorstate.clouds.augmentation import AugmentationDraw
-from doorstate.clouds.normalization import SCALE_M
+from doorstate.clouds.normalization import Placement
 from doorstate.networks.heads.shared import (
+    LENGTH_WEIGHT,
     angle_error_deg,
     direction_loss,
     distance,
@@ -18,7 +19,6 @@ from doorstate.networks.heads.shared import (
     quantile,
 )
 from doorstate.networks.heads.spec import Column, Floats, HeadSpec, Metric, States, Values
-from doorstate.types import Points
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -31,20 +31,20 @@ def _decode(outputs: Tensor) -> Tensor:
 
 
 def _loss(outputs: Tensor, target: Tensor) -> Tensor:
-    """Return the error of the position in metres plus that of the direction, which is close to radians."""
+    """Return the weighted error of the position plus that of the direction, which is close to radians."""
     position = distance(outputs[:, :2], target[:, :2])
-    return SCALE_M * position + direction_loss(outputs[:, 2:], target[:, 2:])
+    return LENGTH_WEIGHT * position + direction_loss(outputs[:, 2:], target[:, 2:])
 
 
-def _to_values(columns: Floats, centroids: Points) -> Floats:
+def _to_values(columns: Floats, placement: Placement) -> Floats:
     """Convert the position, and the yaw of the wall, which the manifest holds, to that of its normal."""
-    position = columns[:, :2] - centroids[:, :2]
+    position = columns[:, :2] - placement.centres[:, :2]
     normal = np.radians(columns[:, 2] + 90)
-    return np.column_stack([position / SCALE_M, np.arctan2(np.sin(normal), np.cos(normal))])
+    return np.column_stack([position / placement.scale_m, np.arctan2(np.sin(normal), np.cos(normal))])
 
 
-def _to_columns(values: Floats, centroids: Points) -> Floats:
-    position = values[:, :2] * SCALE_M + centroids[:, :2]
+def _to_columns(values: Floats, placement: Placement) -> Floats:
+    position = values[:, :2] * placement.scale_m + placement.centres[:, :2]
     return np.column_stack([position, (np.degrees(values[:, 2]) + 90) % 360 - 180])
 
 
@@ -75,8 +75,8 @@ def _yaw_error_median(columns: Floats, truth: Floats, states: States) -> float:
 FRAME_HEAD = HeadSpec(
     name="frame",
     description=(
-        f"x, y of the opening's middle, divided by {SCALE_M} after the mean of the points is taken away, and the yaw "
-        "in radians of the wall's normal towards the camera"
+        "x, y of the opening's middle, normalised as the points are, and the yaw in radians of the wall's normal "
+        "towards the camera"
     ),
     columns=(Column("door_x_m", "m"), Column("door_y_m", "m"), Column("door_yaw_deg", "deg")),
     num_outputs=4,

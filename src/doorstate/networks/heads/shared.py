@@ -15,6 +15,9 @@ if TYPE_CHECKING:
     from torch import Tensor
 
 
+LENGTH_WEIGHT = 3.0  # of a length in the network's unit, in losses: whole clouds have units of 3 m
+
+
 def sigmoid(outputs: Tensor) -> Tensor:
     """Decode logits to probabilities."""
     return outputs.sigmoid()

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from doorstate.clouds.augmentation import AugmentationDraw
-from doorstate.types import Points
+from doorstate.clouds.normalization import Placement
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -59,7 +59,7 @@ class Metric:
     compute: Callable[[Floats, Floats, States], float]
 
 
-def _identity(values: Floats, centroids: Points) -> Floats:
+def _identity(values: Floats, placement: Placement) -> Floats:
     return values
 
 
@@ -79,7 +79,7 @@ class HeadSpec:
         decode: (B, num_outputs) outputs to (B, num_values) values.
         loss: (B, num_outputs) outputs and (B, num_values) targets without NaN to (B,) losses.
         metrics: figures of merit.
-        to_values: (M, num_values) columns and (M, 3) centroids in metres to values.
+        to_values: (M, num_values) columns and the placement of M clouds to values.
         to_columns: inverse of `to_values`.
         augment: (B, num_values) targets of clouds that are changed by a draw.
     """
@@ -91,8 +91,8 @@ class HeadSpec:
     decode: Callable[[Tensor], Tensor]
     loss: Callable[[Tensor, Tensor], Tensor]
     metrics: tuple[Metric, ...]
-    to_values: Callable[[Floats, Points], Floats] = _identity
-    to_columns: Callable[[Floats, Points], Floats] = _identity
+    to_values: Callable[[Floats, Placement], Floats] = _identity
+    to_columns: Callable[[Floats, Placement], Floats] = _identity
     augment: Callable[[Values, AugmentationDraw], NDArray[np.floating]] = _invariant
 
     @property
@@ -109,9 +109,9 @@ class HeadSpec:
         """Return the (M, num_values) true columns of manifest rows, NaN where unknown."""
         return np.stack([column.truth(rows) for column in self.columns], axis=1)
 
-    def target(self, rows: Sequence[ManifestRow], centroids: Points) -> Values:
-        """Return the (M, num_values) targets of samples whose clouds were centred on (M, 3) centroids in metres."""
-        return self.to_values(self.truth(rows), centroids).astype(np.float32)
+    def target(self, rows: Sequence[ManifestRow], placement: Placement) -> Values:
+        """Return the (M, num_values) targets of samples whose clouds were normalised with this placement."""
+        return self.to_values(self.truth(rows), placement).astype(np.float32)
 
 
 @dataclass(frozen=True)

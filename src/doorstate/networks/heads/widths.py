@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from doorstate.clouds.augmentation import AugmentationDraw
-from doorstate.clouds.normalization import SCALE_M
-from doorstate.networks.heads.shared import mean, plan_transform
+from doorstate.clouds.normalization import Placement
+from doorstate.networks.heads.shared import LENGTH_WEIGHT, mean, plan_transform
 from doorstate.networks.heads.spec import Column, Floats, HeadSpec, Metric, States, Values
-from doorstate.types import Points
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -23,16 +22,16 @@ def _decode(outputs: Tensor) -> Tensor:
 
 
 def _loss(outputs: Tensor, target: Tensor) -> Tensor:
-    """Return the sum of the absolute errors in metres."""
-    return SCALE_M * (outputs - target).abs().sum(dim=1)
+    """Return the weighted sum of the absolute errors."""
+    return LENGTH_WEIGHT * (outputs - target).abs().sum(dim=1)
 
 
-def _to_values(columns: Floats, centroids: Points) -> Floats:
-    return columns / SCALE_M
+def _to_values(columns: Floats, placement: Placement) -> Floats:
+    return columns / placement.scale_m
 
 
-def _to_columns(values: Floats, centroids: Points) -> Floats:
-    return values * SCALE_M
+def _to_columns(values: Floats, placement: Placement) -> Floats:
+    return values * placement.scale_m
 
 
 def _augment(target: Values, draw: AugmentationDraw) -> NDArray[np.floating]:
@@ -51,7 +50,7 @@ def _passage_error(columns: Floats, truth: Floats, states: States) -> float:
 
 WIDTHS_HEAD = HeadSpec(
     name="widths",
-    description=f"widths of the opening and of the free passage, divided by {SCALE_M}",
+    description="widths of the opening and of the free passage, divided by the scale of the points",
     columns=(
         Column("opening_width_m", "m"),
         Column("passable_width_m", "m"),
