@@ -15,6 +15,7 @@ from doorstate.dataset.store import is_prepared
 
 SIMULATED = {
     "ogurob": "--preset ogurob",
+    "ogurob-doorways": "--preset ogurob",
     # Training sets, alone and mixed; `varied` is `varied-xtion` without noise.
     "varied": "--preset varied --scenes 1200 --seed 11",
     "varied-xtion": "--preset varied --scenes 1200 --seed 11 --sensor xtion",
@@ -38,6 +39,17 @@ SIMULATED = {
     "more-no-door-deepdoors2": "--preset no-door --scenes 250 --seed 48 --sensor deepdoors2",
     "more-varied-clean": "--preset varied --scenes 300 --seed 49",
     "more-no-door-clean": "--preset no-door --scenes 100 --seed 50",
+    # Training sets of doorways, mixed.
+    "doorways-varied-xtion": "--preset varied --scenes 1000 --seed 61 --sensor xtion",
+    "doorways-varied-d435": "--preset varied --scenes 500 --seed 62 --sensor d435",
+    "doorways-varied-kinect": "--preset varied --scenes 250 --seed 63 --sensor kinect",
+    "doorways-varied-clean": "--preset varied --scenes 200 --seed 64",
+    "doorways-cluttered-xtion": "--preset cluttered --scenes 300 --seed 65 --sensor xtion",
+    "doorways-cluttered-kinect": "--preset cluttered --scenes 250 --seed 66 --sensor kinect",
+    "doorways-no-door-xtion": "--preset no-door --scenes 700 --seed 67 --sensor xtion",
+    "doorways-no-door-d435": "--preset no-door --scenes 450 --seed 68 --sensor d435",
+    "doorways-no-door-kinect": "--preset no-door --scenes 300 --seed 69 --sensor kinect",
+    "doorways-no-door-clean": "--preset no-door --scenes 150 --seed 70",
     # Test sets: the same doors for every sensor.
     **{
         f"test-{name}": f"--preset varied --scenes 100 --seed 21 --sensor {sensor}"
@@ -63,10 +75,17 @@ _MIXED = (
     "varied-clean",
     "no-door-clean",
 )
-JOINED = {"mixture": _MIXED, "more-mixture": tuple(f"more-{part}" for part in _MIXED)}
+_DOORWAYS = tuple(name for name in SIMULATED if name.startswith("doorways-"))
+JOINED = {
+    "mixture": _MIXED,
+    "more-mixture": tuple(f"more-{part}" for part in _MIXED),
+    "doorways-train": _DOORWAYS,
+}
 # The D435 reaches 10 m, all others 5 m or less. Doors are within 3.5 m; without a limit, farthest-point sampling would
 # spend most points on the next room behind an open door. Clouds are thinned as a predictor thins them.
 LIMITS = "--thin --max-depth-m 5"
+# The published clouds were made before outliers were removed.
+OUTLIERS = "--keep-outliers"
 
 
 class Command(NamedTuple):
@@ -87,9 +106,7 @@ def dataset_commands(prepared: Path) -> Iterator[Command]:
     """
     name, _, points = prepared.name.rpartition("-")
     if name not in JOINED:
-        limits = "" if name.endswith("ogurob") else f" {LIMITS}"
-        # The published clouds were made before outliers were removed.
-        output = f"--prepared data/{name}-{points} --points {points}{limits} --keep-outliers"
+        output = f"--prepared data/{name}-{points} --points {points} {_preparation(name)}"
         yield Command(f"simulate {SIMULATED[name]} --out data/{name} {output}", prepared)
     elif not is_prepared(prepared):
         parts = [prepared.with_name(f"{part}-{points}") for part in JOINED[name]]
@@ -97,3 +114,12 @@ def dataset_commands(prepared: Path) -> Iterator[Command]:
             yield from dataset_commands(part)
         joined = " ".join(f"data/{part.name}" for part in parts)
         yield Command(f"join {joined} --out data/{name}-{points}", prepared)
+
+
+def _preparation(name: str) -> str:
+    """Return the options of the prepared clouds of a simulation."""
+    if name in _DOORWAYS:
+        return "--input doorway --add-missed"
+    if name.endswith("-doorways"):  # one answer a frame
+        return "--input doorway --crops best"
+    return OUTLIERS if name.endswith("ogurob") else f"{LIMITS} {OUTLIERS}"

@@ -161,6 +161,6 @@ def test_extra_data_sets_are_appended_as_a_whole(
     for name, values in joined.targets.items():
         expected = torch.cat([batch.targets[name] for batch in separate])
         torch.testing.assert_close(values, expected, rtol=0, atol=0, equal_nan=True)
-    assert len(loader.centroids) == len(loader)
+    assert len(loader.placement.centres) == len(loader)
     with pytest.raises(ConfigError, match="160"):
         CloudLoader(more_dataset, [], 161)

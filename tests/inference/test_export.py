@@ -10,7 +10,7 @@ import onnx
 import pytest
 import torch
 
-from doorstate.clouds.normalization import normalize
+from doorstate.clouds.normalization import NORMALIZATIONS, Input, normalize
 from doorstate.clouds.preparation import CloudSpec, prepare_cloud
 from doorstate.errors import ExportError
 from doorstate.inference.backends.onnx_backend import OnnxBackend
@@ -21,7 +21,7 @@ from doorstate.inference.reference_clouds import LabelledClouds
 from doorstate.networks import create_network, list_networks
 from doorstate.networks.base import PointNetwork
 from doorstate.networks.card import WeightsCard
-from doorstate.networks.head_layers import add_heads
+from doorstate.networks.head_layers import add_heads, head_outputs
 from doorstate.networks.heads import HEADS
 from doorstate.networks.layers.batch_norm import set_batchnorm
 
@@ -29,8 +29,11 @@ OUTPUTS = ["state", "reason", "probabilities", "raw_probabilities"]
 SLOW = {"pointcnn"}
 
 
-def card_of(name: str) -> WeightsCard:
-    return WeightsCard(network=name, num_points=4096, temperature=0.1, trained_on="nothing")
+def card_of(name: str, cloud: Input = "whole") -> WeightsCard:
+    scale_m = NORMALIZATIONS[cloud].scale_m
+    return WeightsCard(
+        network=name, input=cloud, scale_m=scale_m, num_points=4096, temperature=0.1, trained_on="nothing"
+    )
 
 
 @pytest.fixture(scope="module")
@@ -120,7 +123,10 @@ def test_int8_is_a_quarter_of_the_size_and_differs(clouds: LabelledClouds, tmp_p
 def test_a_file_that_differs_from_torch_is_not_written(
     clouds: LabelledClouds, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("doorstate.inference.export.graph.SCALE_M", 2.0)
+    def of_larger_clouds(network: PointNetwork, points: torch.Tensor, **options: bool) -> dict[str, torch.Tensor]:
+        return head_outputs(network, 1.5 * points, **options)  # type: ignore[arg-type]
+
+    monkeypatch.setattr("doorstate.inference.export.graph.head_outputs", of_larger_clouds)
     with pytest.raises(ExportError) as caught:
         export_onnx(
             tmp_path / "net.onnx", network_trained_on("pointnet", clouds), card_of("pointnet"), clouds

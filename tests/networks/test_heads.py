@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 
 from doorstate.clouds.augmentation import Augmentation, apply_augmentation, draw_augmentation
-from doorstate.clouds.normalization import SCALE_M
+from doorstate.clouds.normalization import SCALE_M, Placement
 from doorstate.dataset.store import PreparedDataset
 from doorstate.networks.heads import (
     HEADS,
@@ -39,9 +39,13 @@ ROW = {
 WITHOUT_DOOR = {"sample_id": "a", "state": "no_door"}
 
 
+def at_origin(clouds: int) -> Placement:
+    return Placement(np.zeros((clouds, 3), np.float32), SCALE_M)
+
+
 def test_targets_are_in_the_units_of_the_normalised_cloud() -> None:
     centroids = np.array([[1.4, 0.2, 0.0], [0.0, 0.0, 0.0]], dtype=np.float32)
-    targets = head_targets([ROW, WITHOUT_DOOR], centroids)
+    targets = head_targets([ROW, WITHOUT_DOOR], Placement(centroids, SCALE_M))
     assert {name: values.shape for name, values in targets.items()} == {
         name: (2, head.num_values) for name, head in HEADS.items()
     }
@@ -63,12 +67,12 @@ def test_targets_are_in_the_units_of_the_normalised_cloud() -> None:
 
 
 def test_only_the_named_heads_have_targets() -> None:
-    assert list(head_targets([ROW], np.zeros((1, 3), np.float32), ["widths", "parts"])) == ["widths"]
+    assert list(head_targets([ROW], at_origin(1), ["widths", "parts"])) == ["widths"]
 
 
 def test_targets_of_a_drawn_row() -> None:
     row = flatten(draw_rows(PRESETS["ogurob"], 3, 700)[1])
-    targets = head_targets([row], np.zeros((1, 3), dtype=np.float32))
+    targets = head_targets([row], at_origin(1))
     assert targets["hinge"][0, 0] == 1
     assert targets["widths"][0, 0] * SCALE_M == pytest.approx(0.9)
     assert targets["widths"][0, 1] * SCALE_M == pytest.approx(float(row["passable_width_m"]))
@@ -127,17 +131,19 @@ def test_a_mirrored_door_is_hinged_on_the_other_side() -> None:
 
 
 def test_missing_targets_stay_missing_under_augmentation() -> None:
-    missing = head_targets([WITHOUT_DOOR] * 50, np.zeros((50, 3), dtype=np.float32))
+    missing = head_targets([WITHOUT_DOOR] * 50, at_origin(50))
     draw = draw_augmentation(Augmentation(yaw_deg=90, mirror=0.5, shift=0.1), np.random.default_rng(0), 50, 2)
     moved = augment_targets(missing, draw)
     assert not moved.pop("door").any()
     assert all(np.isnan(values).all() for values in moved.values())
 
 
-def test_columns_of_targets_equal_the_manifest(scene_dataset: PreparedDataset) -> None:
+@pytest.mark.parametrize("scale_m", [SCALE_M, 1.5])
+def test_columns_of_targets_equal_the_manifest(scene_dataset: PreparedDataset, scale_m: float) -> None:
     rows = scene_dataset.rows
     centroids = np.random.default_rng(0).uniform(-1, 3, (len(rows), 3)).astype(np.float32)
-    columns = head_columns(head_targets(rows, centroids), centroids)
+    placement = Placement(centroids, scale_m)
+    columns = head_columns(head_targets(rows, placement), placement)
     for name in ("opening_angle_deg", "door_x_m", "door_y_m", "opening_width_m", "passable_width_m"):
         expected = [float(row[name] or math.nan) for row in rows]
         assert np.isfinite(expected).any()
@@ -151,7 +157,7 @@ def test_columns_of_targets_equal_the_manifest(scene_dataset: PreparedDataset) -
 
 def test_impossible_opening_angles_become_the_nearest_possible_one() -> None:
     values = np.radians(np.array([[-5.0], [-89.0], [-91.0], [-179.0], [0.0], [75.0], [180.0], [np.nan]]))
-    columns = head_columns({"angle": values.astype(np.float32)}, np.zeros((8, 3), np.float32))
+    columns = head_columns({"angle": values.astype(np.float32)}, at_origin(8))
     assert_allclose(columns["opening_angle_deg"], [0, 0, 180, 180, 0, 75, 180, np.nan], atol=1e-4)
 
 
@@ -161,7 +167,7 @@ def test_outputs_are_decoded_to_columns() -> None:
         "angle": HEADS["angle"].decode(torch.cat([angle.cos(), angle.sin()], dim=1)).numpy(),
         "frame": HEADS["frame"].decode(torch.tensor([[0.1, -0.2, math.cos(yaw), math.sin(yaw)]])).numpy(),
     }
-    columns = head_columns(values, np.array([[1.0, 0.5, 0.0]], dtype=np.float32))
+    columns = head_columns(values, Placement(np.array([[1.0, 0.5, 0.0]], dtype=np.float32), SCALE_M))
     assert_allclose(columns["opening_angle_deg"], math.degrees(1.1), rtol=1e-6)
     assert_allclose([columns["door_x_m"][0], columns["door_y_m"][0]], [1.3, -0.1], atol=1e-6)
     assert_allclose(columns["door_yaw_deg"], math.degrees(2.5) - 90, rtol=1e-6)

@@ -136,6 +136,12 @@ def _raw_kinds() -> Iterable[str]:
     return RAW_KINDS
 
 
+def _inputs() -> Iterable[str]:
+    from doorstate.clouds.normalization import NORMALIZATIONS
+
+    return NORMALIZATIONS
+
+
 PACKAGED = Choice("packaged weights", "network", _packaged, _offered)
 NETWORK = Choice("network", "network", _networks)
 RULE = Choice("rule", "rule", _rules)
@@ -146,6 +152,8 @@ LAYOUT = Choice("layout", "layout", _layouts)
 PRESET = Choice("preset", "preset", _presets)
 SENSOR = Choice("sensor", "sensor", _sensors, prefix="gaussian:")
 RAW_KIND = Choice("kind of raw file", "keep", _raw_kinds)
+INPUT = Choice("input", "input", _inputs)
+KEPT_CROPS = Choice("choice of crops", "crops", lambda: ("all", "best"))
 
 _PLACEHOLDERS = {
     "packaged": PACKAGED,
@@ -158,6 +166,8 @@ _PLACEHOLDERS = {
     "presets": PRESET,
     "sensors": SENSOR,
     "raw_kinds": RAW_KIND,
+    "inputs": INPUT,
+    "kept_crops": KEPT_CROPS,
 }
 
 

@@ -79,23 +79,6 @@ LayoutName = Annotated[
 ]
 
 # Data sets.
-PreparedPoints = Annotated[int, typer.Option("--points", help="Points of each prepared cloud.", min=128)]
-MaxDepth = Annotated[
-    float | None,
-    typer.Option("--max-depth-m", help="Drop points farther ahead than this, in metres.", min=0.5),
-]
-Thin = Annotated[
-    bool,
-    typer.Option(
-        "--thin", help="Sample from every second, third, ... row and column of an image, as predict does."
-    ),
-]
-KeepOutliers = Annotated[
-    bool,
-    typer.Option(
-        "--keep-outliers", help="Keep pixels and small blobs that float before or behind every surface."
-    ),
-]
 ShardOption = Annotated[
     str | None,
     typer.Option(help="Process only this part of the work, such as 2/8; without it, all parts are joined."),

@@ -8,14 +8,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from doorstate.cli.options import (
+from doorstate.cli.options import LayoutName, ShardOption, Workers
+from doorstate.cli.prepared_options import (
+    AddMissed,
+    InputName,
     KeepOutliers,
-    LayoutName,
+    KeptCrops,
     MaxDepth,
     PreparedPoints,
-    ShardOption,
     Thin,
-    Workers,
+    prepared_clouds,
 )
 from doorstate.cli.reading_options import check_layout, with_reading_options
 from doorstate.errors import ConfigError
@@ -33,7 +35,7 @@ def prepare(
         Path, typer.Argument(help="Simulated folder, or folder with one sub-folder of clouds for each state.")
     ],
     out: Annotated[Path, typer.Option(help="Folder to create, or to continue.")],
-    points: PreparedPoints = 4096,
+    points: PreparedPoints = None,
     poses: Annotated[
         Path | None,
         typer.Option(
@@ -47,18 +49,23 @@ def prepare(
     max_depth: MaxDepth = None,
     thin: Thin = False,
     keep_outliers: KeepOutliers = False,
+    input_name: InputName = "whole",
+    crops: KeptCrops = "all",
+    add_missed: AddMissed = False,
     *,
     options: ReadOptions,
 ) -> None:
     """Clean and sort clouds for training.
 
     Outliers are removed, and points are sorted by farthest-point sampling: the first N points are a sample of N points.
-    An interrupted preparation continues where it stopped.
+    With --input doorway, the candidate doorways of each cloud are cropped. An interrupted preparation continues where
+    it stopped.
 
     \b
     Examples:
       doorstate prepare data/ogurob --out data/ogurob-4096
       doorstate prepare data/varied --thin --max-depth-m 5 --out data/varied-4096
+      doorstate prepare data/varied --input doorway --add-missed --out data/varied-doorways
       doorstate prepare data/varied --shard 2/8 --out data/varied-4096
       doorstate prepare DeepDoors2 --layout deepdoors2 --out data/deepdoors2
       doorstate prepare ~/OGUROB_DOORS --pose-file poses.csv --axes optical --out data/original
@@ -66,15 +73,14 @@ def prepare(
     from doorstate._jobs import Shard
     from doorstate.cli.console import stdout
     from doorstate.cli.progress import progress_bar
-    from doorstate.clouds.preparation import CloudSpec
     from doorstate.dataset.preparation import Preparation
     from doorstate.dataset.prepare import prepare_dataset, prepare_shard
 
     check_layout(layout, options)
     if layout is not None and poses is not None:
         raise ConfigError("--pose-file cannot be combined with --layout")
-    spec = CloudSpec(num_points=points, thin=thin, max_depth_m=max_depth, remove_outliers=not keep_outliers)
-    preparation = Preparation(source, spec, poses, options, layout)
+    spec, kept = prepared_clouds(points, max_depth, thin, keep_outliers, input_name, crops, add_missed)
+    preparation = Preparation(source, spec, poses, options, layout, kept)
     if shard is not None:
         part = Shard.parse(shard)
         with progress_bar("Preparing") as progress:
@@ -83,10 +89,10 @@ def prepare(
         return
     with progress_bar("Preparing") as progress:
         summary = prepare_dataset(preparation, out, workers, progress)
-    print_summary(summary, out, points)
+    print_summary(summary, out)
 
 
-def print_summary(summary: PreparationSummary, out: Path, points: int) -> None:
+def print_summary(summary: PreparationSummary, out: Path) -> None:
     """Print the number of prepared clouds; exit with code 1 if clouds were rejected."""
     from doorstate.cli.console import stderr, stdout
     from doorstate.types import NO_DOOR, STATES
@@ -101,6 +107,8 @@ def print_summary(summary: PreparationSummary, out: Path, points: int) -> None:
         if not counts[state] and summary.dataset.description.kind == "imported":
             stderr.print(f"no clouds of state {state}: check the name of its folder")
     by_state = ", ".join(f"{count} {name}" for name, count in counts.items() if count or name != NO_DOOR)
-    stdout.print(f"{len(summary.dataset)} clouds of {points} points in {out} ({by_state})")
+    stdout.print(
+        f"{len(summary.dataset)} clouds of {summary.dataset.num_points} points in {out} ({by_state})"
+    )
     if summary.rejected:
         raise typer.Exit(1)

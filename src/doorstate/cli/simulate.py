@@ -9,7 +9,17 @@ from typing import Annotated
 import typer
 
 from doorstate.cli.choices import PRESET, RAW_KIND, SENSOR, split_names
-from doorstate.cli.options import KeepOutliers, MaxDepth, PreparedPoints, ShardOption, Thin, Workers
+from doorstate.cli.options import ShardOption, Workers
+from doorstate.cli.prepared_options import (
+    AddMissed,
+    InputName,
+    KeepOutliers,
+    KeptCrops,
+    MaxDepth,
+    PreparedPoints,
+    Thin,
+    prepared_clouds,
+)
 from doorstate.errors import ConfigError
 
 
@@ -48,10 +58,13 @@ def simulate(
         Path | None,
         typer.Option(help="Folder for prepared clouds, as written by doorstate prepare."),
     ] = None,
-    points: PreparedPoints = 4096,
+    points: PreparedPoints = None,
     max_depth: MaxDepth = None,
     thin: Thin = False,
     keep_outliers: KeepOutliers = False,
+    input_name: InputName = "whole",
+    crops: KeptCrops = "all",
+    add_missed: AddMissed = False,
 ) -> None:
     """Simulate doors seen by a depth camera.
 
@@ -72,7 +85,6 @@ def simulate(
     from doorstate.cli.console import stderr, stdout
     from doorstate.cli.prepare import print_summary
     from doorstate.cli.progress import progress_bar
-    from doorstate.clouds.preparation import CloudSpec
     from doorstate.dataset.preparation import Preparation
     from doorstate.dataset.simulated import Sampler, simulate_prepared
     from doorstate.simulation.settings import RAW_KINDS, settings_for
@@ -81,10 +93,10 @@ def simulate(
     kept = split_names(keep)
     kinds = tuple(kind for kind in RAW_KINDS if kind in kept)
     settings = settings_for(preset, seed, poses, scenes, kinds, sensor)
-    spec = CloudSpec(num_points=points, thin=thin, max_depth_m=max_depth, remove_outliers=not keep_outliers)
-    preparation = Preparation(out, spec)
+    spec, of_doorways = prepared_clouds(points, max_depth, thin, keep_outliers, input_name, crops, add_missed)
+    preparation = Preparation(out, spec, crops=of_doorways)
     if prepared is None and preparation != Preparation(out):
-        raise ConfigError("--points, --max-depth-m, --thin and --keep-outliers need --prepared")
+        raise ConfigError("options of prepared clouds need --prepared")
     if shard is not None:
         part = Shard.parse(shard)
         with progress_bar("Simulating") as progress:
@@ -106,7 +118,7 @@ def simulate(
         stdout.print(f"{len(rows)} samples in {out}; next: doorstate prepare {out} --out {out}-4096")
     else:
         stdout.print(f"{len(rows)} samples in {out}")
-        print_summary(summary, prepared, points)
+        print_summary(summary, prepared)
 
 
 def _print_counts(rows: list[dict[str, str]]) -> None:

@@ -12,7 +12,9 @@ from doorstate.types import Points
 
 Input = Literal["whole", "doorway"]
 """Cloud that a network gets: the whole view in the sensor frame, or a crop in the frame of its doorway."""
-SCALE_M = 3.0  # of whole clouds, half the depth of a typical frame: networks were designed for about unit radius
+SCALE_M = (
+    3.0  # of whole clouds, half the depth of a typical frame: networks were designed for about unit radius
+)
 _DOORWAY_SCALE_M = 1.5  # half the width of a crop
 _DOORWAY_CENTRE_M = (0.0, 0.0, 1.05)  # half the height of a door
 

@@ -13,7 +13,7 @@ from doorstate._models import FrozenModel
 from doorstate.clouds.measured import is_measured
 from doorstate.clouds.outliers import remove_outliers
 from doorstate.clouds.samplers import Sampler
-from doorstate.clouds.sampling import farthest_point_indices
+from doorstate.clouds.sampling import POINTS_PER_LEAF, farthest_point_indices
 from doorstate.clouds.shape import check_shape
 from doorstate.clouds.thinning import CELLS_PER_POINT, PIXELS_PER_POINT, thinned_pixels, thinned_points
 from doorstate.clouds.units import check_units, median_range_m
@@ -82,9 +82,14 @@ def prepare_cloud(
     return PreparedCloud(clean[sampled], rows[sampled])
 
 
-def distinct_farthest_points(points: Points, count: int, sampler: Sampler | None = None) -> Indices:
-    """Return the indices of at most `count` points (N, 3) in farthest-point order, each distinct point once."""
-    sampled = farthest_point_indices(points, min(count, len(points)), sampler)
+def distinct_farthest_points(
+    points: Points, count: int, sampler: Sampler | None = None, points_per_leaf: int = POINTS_PER_LEAF
+) -> Indices:
+    """Return the indices of at most `count` points (N, 3) in farthest-point order, each distinct point once.
+
+    Arguments are those of `farthest_point_indices`.
+    """
+    sampled = farthest_point_indices(points, min(count, len(points)), sampler, points_per_leaf)
     # Sampling repeats a point only after all distinct ones, so the repeats are at the end.
     return sampled[: len(np.unique(sampled))]
 

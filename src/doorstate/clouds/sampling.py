@@ -16,16 +16,19 @@ import numpy as np
 from doorstate.clouds.samplers import Sampler, choose_sampler
 from doorstate.types import Indices, Points
 
-_POINTS_PER_LEAF = 2048  # of the k-d tree; fastest for fpsample at 300,000 points
+POINTS_PER_LEAF = 2048  # of the k-d tree; fastest for fpsample at 300,000 points
 
 
-def farthest_point_indices(points: Points, count: int, sampler: Sampler | None = None) -> Indices:
+def farthest_point_indices(
+    points: Points, count: int, sampler: Sampler | None = None, points_per_leaf: int = POINTS_PER_LEAF
+) -> Indices:
     """Return the indices of `count` points in farthest-point order, exact.
 
     Args:
         points: (N, 3) float32 metres, finite, N >= count >= 1.
         count: number of points to choose.
         sampler: implementation to use; all give the same indices. None: `choose_sampler()`.
+        points_per_leaf: size of the leaves of the k-d tree that is built, which breaks ties and sets the time.
 
     Returns:
         (count,) int64. Distinct points give distinct indices; when all are taken, the first is repeated.
@@ -43,7 +46,7 @@ def farthest_point_indices(points: Points, count: int, sampler: Sampler | None =
     lowest = points.min(axis=0)
     diagonal = np.float32(np.linalg.norm(points.max(axis=0) - lowest) + 1.0)
     with_anchor = np.concatenate([(lowest - diagonal)[None], points])
-    height = max(1, int(np.log2(len(with_anchor) / _POINTS_PER_LEAF)))
+    height = max(1, int(np.log2(len(with_anchor) / points_per_leaf)))
     sampler = sampler or choose_sampler()
     indices = sampler(with_anchor, count + 1, height)[1:] - 1
     # Once all distinct points are taken, all distances are 0 and the anchor, as -1, is chosen again.

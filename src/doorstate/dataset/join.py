@@ -75,6 +75,7 @@ def _join(sources: Sequence[Path], folder: Path) -> PreparedDataset:
         max_depth_m=None if None in limits_m else max(limit_m for limit_m in limits_m if limit_m),
         thin=datasets[0].description.thin,
         remove_outliers=datasets[0].description.remove_outliers,
+        crops=datasets[0].description.crops,
         doorstate_version=__version__,
     ).save(folder)
     return open_dataset(folder)
@@ -82,7 +83,7 @@ def _join(sources: Sequence[Path], folder: Path) -> PreparedDataset:
 
 def check_same_sampling(dataset: PreparedDataset, reference: PreparedDataset) -> None:
     """Raise ConfigError if only one data set was thinned, or cleaned of outliers, before sampling."""
-    for name in ("thin", "remove_outliers"):
+    for name in ("input", "thin", "remove_outliers"):
         value, expected = (getattr(each.description, name) for each in (dataset, reference))
         if value != expected:
             raise ConfigError(

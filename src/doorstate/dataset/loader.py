@@ -116,6 +116,7 @@ class CloudLoader:
         seed: Sequence[int],
         skip: int = 0,
         limit: int | None = None,
+        no_door_share: float | None = None,
     ) -> Iterator[Batch]:
         """Yield one training epoch, shuffled and augmented, without an incomplete last batch.
 
@@ -125,15 +126,32 @@ class CloudLoader:
             seed: seed of the epoch.
             skip: number of batches to leave out at the start.
             limit: number of random clouds in the epoch; None is all.
+            no_door_share: share of clouds without a door in the epoch; the others, or these, are then drawn more
+                often. None: as in the data.
         """
         rng = np.random.default_rng(seed)
-        order = rng.permutation(len(self))[:limit]
+        if no_door_share is None:
+            order = rng.permutation(len(self))[:limit]
+        else:
+            order = self._draw(rng, min(len(self), limit or len(self)), no_door_share)
         batch_size = min(batch_size, len(order))
         num_points = self._points.shape[1]
         for number, start in enumerate(range(0, len(order) - batch_size + 1, batch_size)):
             draw = draw_augmentation(augmentation, rng, batch_size, num_points, self._normalization.across)
             if number >= skip:
                 yield self._batch(order[start : start + batch_size], draw)
+
+    def _draw(self, rng: np.random.Generator, count: int, no_door_share: float) -> np.ndarray:
+        """Return the numbers of `count` samples in random order, with a share of those without a door."""
+        has_door = self._labels != IGNORE_INDEX
+        groups = [np.flatnonzero(~has_door), np.flatnonzero(has_door)]
+        without = round(no_door_share * count) if len(groups[0]) else 0
+        drawn = [
+            np.resize(np.concatenate([rng.permutation(group) for _ in range(1 + size // len(group))]), size)
+            for group, size in zip(groups, (without, count - without), strict=True)
+            if size
+        ]
+        return rng.permutation(np.concatenate(drawn))
 
     def _batch(self, indices: np.ndarray, draw: AugmentationDraw | None) -> Batch:
         points = self._points[indices]

@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+import json
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -14,25 +16,29 @@ from doorstate._files import atomic_path
 from doorstate.types import Points
 
 
+class Sample(NamedTuple):
+    """Cloud made from a row of the source, or the reason why there is none."""
+
+    cloud: Points | None  # (n, 3) in farthest-point order
+    parts: NDArray[np.uint8] | None = None  # (n,) parts of its points if known
+    columns: Mapping[str, str] = MappingProxyType({})  # in place of those of the row, and more
+    reason: str = ""  # of a cloud that is left out
+
+
 class PieceClouds:
-    """Prepared clouds of a piece, and for each sample the reason why it is left out, or ""."""
+    """Samples of the rows of a piece of work: one or more for each row."""
 
     def __init__(self, num_points: int) -> None:
         self._num_points = num_points
         self._clouds: list[Points] = []
         self._parts: list[NDArray[np.uint8]] = []
-        self._reasons: list[str] = []
+        self._samples: list[list[tuple[dict[str, str], str]]] = []
 
-    def add(self, cloud: Points, parts: NDArray[np.uint8] | None = None) -> None:
-        """Append the cloud (n, 3) of the next sample, and the parts of its points if known."""
-        self._clouds.append(cloud)
-        if parts is not None:
-            self._parts.append(parts)
-        self._reasons.append("")
-
-    def reject(self, reason: str) -> None:
-        """Leave the next sample out."""
-        self._reasons.append(reason)
+    def add(self, samples: Sequence[Sample]) -> None:
+        """Append the samples of the next row."""
+        self._samples.append([(dict(sample.columns), sample.reason) for sample in samples])
+        self._clouds += [sample.cloud for sample in samples if sample.cloud is not None]
+        self._parts += [sample.parts for sample in samples if sample.parts is not None]
 
     def save(self, path: Path) -> None:
         """Write the piece."""
@@ -41,33 +47,54 @@ class PieceClouds:
                 temporary,
                 clouds=np.array(self._clouds, dtype=np.float32).reshape(-1, self._num_points, 3),
                 parts=np.array(self._parts, dtype=np.uint8).reshape(-1, self._num_points),
-                reasons=np.array(self._reasons, dtype=str),
+                samples=np.array(json.dumps(self._samples)),
             )
 
 
 class SavedPieces(NamedTuple):
-    """Files of `PieceClouds` in the order of their samples."""
+    """Files of `PieceClouds` in the order of their rows."""
 
     paths: Sequence[Path]
-    reasons: list[str]  # of all samples, "" for those that are kept
+    samples: list[list[tuple[dict[str, str], str]]]  # by row: columns and reason, "" for clouds that are kept
 
     @classmethod
     def read(cls, paths: Sequence[Path]) -> Self:
-        """Read the reasons of all pieces."""
-        reasons: list[str] = []
+        """Read the columns and reasons of all pieces."""
+        samples: list[list[tuple[dict[str, str], str]]] = []
         for path in paths:
             with np.load(path, allow_pickle=False) as piece:
-                reasons += [str(reason) for reason in piece["reasons"]]
-        return cls(paths, reasons)
+                samples += json.loads(str(piece["samples"]))
+        return cls(paths, samples)
+
+    def lines(self, rows: Sequence[Mapping[str, str]]) -> tuple[list[dict[str, str]], list[dict[str, str]]]:
+        """Return the lines of the clouds that are kept, and sample_id, file and reason of the others.
+
+        Args:
+            rows: rows of the source.
+        """
+        kept, rejected = [], []
+        for row, samples in zip(rows, self.samples, strict=True):
+            for columns, reason in samples:
+                line = {**row, **columns}
+                if reason:
+                    names = {"sample_id": line["sample_id"], "file": line.get("file", "")}
+                    rejected.append({**names, "reason": reason})
+                else:
+                    kept.append(line)
+        return kept, rejected
 
     def join_clouds(self, target: Path, num_points: int) -> None:
         """Write the clouds of all pieces as one array (M, n, 3)."""
-        shape = (self.reasons.count(""), num_points, 3)
+        shape = (self._num_kept, num_points, 3)
         write_concatenated(target, self._arrays("clouds"), shape, np.float32)
 
     def join_parts(self, target: Path, num_points: int) -> None:
         """Write the parts of all pieces as one array (M, n)."""
-        write_concatenated(target, self._arrays("parts"), (self.reasons.count(""), num_points), np.uint8)
+        write_concatenated(target, self._arrays("parts"), (self._num_kept, num_points), np.uint8)
+
+    @property
+    def _num_kept(self) -> int:
+        return sum(not reason for samples in self.samples for _, reason in samples)
 
     def _arrays(self, name: str) -> Iterator[NDArray[Any]]:
         for path in self.paths:

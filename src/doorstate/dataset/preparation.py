@@ -12,6 +12,7 @@ from typing import NamedTuple
 from doorstate._files import is_vacant, read_csv, write_text
 from doorstate.clouds.preparation import CloudSpec
 from doorstate.dataset.class_folders import labelled_rows
+from doorstate.dataset.crops import Crops
 from doorstate.dataset.layouts import find_layout
 from doorstate.dataset.strata import distance_band, region
 from doorstate.errors import ConfigError, DatasetError
@@ -30,6 +31,7 @@ class Preparation(NamedTuple):
     poses_csv: Path | None = None  # distances and angles for class folders (`dataset.class_folders`)
     options: ReadOptions = ReadOptions()  # for files that do not state their camera and units
     layout: str | None = None  # of a published data set (`dataset.layouts`)
+    crops: Crops | None = None  # of doorways; None for whole clouds
 
     @property
     def is_simulated(self) -> bool:
@@ -45,9 +47,16 @@ class Preparation(NamedTuple):
         """Return one row for each sample of the source, in order.
 
         Raises:
-            ConfigError: options that a simulated source does not take.
+            ConfigError: options that a simulated source does not take, or crops that need the poses of doors.
             DatasetError: the source holds no samples.
         """
+        if self.crops is not None and self.crops != Crops(kept="best") and not self.is_simulated:
+            raise ConfigError(
+                "holds no poses of doors: only the best crop of each cloud has a label",
+                path=self.source,
+                field="crops",
+                expected="best",
+            )
         if self.layout is not None:
             return find_layout(self.layout).rows(self.source)
         if not self.is_simulated:
@@ -67,6 +76,7 @@ class Preparation(NamedTuple):
             "spec": self.spec.model_dump(),
             "options": repr(self.options),
             "layout": self.layout,
+            **({} if self.crops is None else {"crops": self.crops.model_dump()}),
             "rows": hashlib.sha256(json.dumps(rows).encode()).hexdigest(),
         }
         return json.dumps(settings, indent=2) + "\n"

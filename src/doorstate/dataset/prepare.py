@@ -16,7 +16,7 @@ from doorstate.dataset.frame_index import IndexedOptions
 from doorstate.dataset.layouts import find_layout
 from doorstate.dataset.pieces import PieceClouds, SavedPieces
 from doorstate.dataset.preparation import CLAIM, Preparation
-from doorstate.dataset.sampling import sample_cloud, sample_frame
+from doorstate.dataset.sampling import rejected_sample, samples_of_frame, samples_of_recording
 from doorstate.dataset.store import (
     CLOUDS_FILE,
     DESCRIPTION_FILE,
@@ -29,6 +29,7 @@ from doorstate.errors import CameraError, CloudError, DatasetError
 from doorstate.io.readers import read_cloud
 from doorstate.simulation.frames import Frame, depth_sha256, replay
 from doorstate.simulation.manifest import MANIFEST_FILE, unflatten
+from doorstate.simulation.row import Row
 
 REJECTED = "rejected.csv"
 _PIECES = "pieces"
@@ -110,15 +111,12 @@ def assemble(
         DatasetError: none of the clouds could be prepared.
     """
     saved = SavedPieces.read(paths)
-    if all(saved.reasons):
+    kept, rejected = saved.lines(rows)
+    if not kept:
         _release(folder)
-        raise DatasetError(f"none of the {len(rows)} clouds could be prepared; the first: {saved.reasons[0]}")
-    kept = [row for row, reason in zip(rows, saved.reasons, strict=True) if not reason]
-    rejected = [
-        {"sample_id": row["sample_id"], "file": row.get("file", ""), "reason": reason}
-        for row, reason in zip(rows, saved.reasons, strict=True)
-        if reason
-    ]
+        raise DatasetError(
+            f"none of the {len(rows)} clouds could be prepared; the first: {rejected[0]['reason']}"
+        )
     if rejected:
         write_csv(folder / REJECTED, rejected)
     saved.join_clouds(folder / CLOUDS_FILE, preparation.spec.num_points)
@@ -129,6 +127,7 @@ def assemble(
         kind="simulated" if preparation.is_simulated else "imported",
         source=preparation.source_name,
         **preparation.spec.model_dump(),
+        crops=preparation.crops,
         samples=len(kept),
         doorstate_version=__version__,
     ).save(folder)
@@ -160,23 +159,23 @@ def _prepare_piece(piece: _Piece, path: Path) -> None:
     read = read_cloud if preparation.layout is None else find_layout(preparation.layout).read
     indexed = IndexedOptions(preparation.options)
     is_simulated = preparation.is_simulated
-    clouds = PieceClouds(preparation.spec.num_points)
-    for row in piece.rows:
+    spec, crops = preparation.spec, preparation.crops
+    clouds = PieceClouds(spec.num_points)
+    for line in piece.rows:
+        if is_simulated:
+            row = unflatten(line)
+            clouds.add(samples_of_frame(row, _replay(row), spec, crops))
+            continue
         try:
-            if is_simulated:
-                clouds.add(*sample_frame(_replay(row), preparation.spec))
-            else:
-                file = preparation.source / row["file"]
-                options = indexed.of(file) if preparation.layout is None else preparation.options
-                points = read(file, options)
-                clouds.add(sample_cloud(points, preparation.spec).points)
+            file = preparation.source / line["file"]
+            options = indexed.of(file) if preparation.layout is None else preparation.options
+            clouds.add(samples_of_recording(line, read(file, options), spec, crops))
         except (CloudError, CameraError) as error:
-            clouds.reject(error.describe(with_path=False))
+            clouds.add([rejected_sample(error)])
     clouds.save(path)
 
 
-def _replay(line: dict[str, str]) -> Frame:
-    row = unflatten(line)
+def _replay(row: Row) -> Frame:
     frame = replay(row)
     if depth_sha256(frame) != row.depth_sha256:
         raise DatasetError(

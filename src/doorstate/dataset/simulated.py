@@ -13,9 +13,8 @@ from doorstate._locks import owned_folder
 from doorstate.dataset.pieces import PieceClouds
 from doorstate.dataset.preparation import Preparation
 from doorstate.dataset.prepare import PreparationSummary, assemble, prepare_dataset
-from doorstate.dataset.sampling import sample_frame
+from doorstate.dataset.sampling import samples_of_frame
 from doorstate.dataset.store import is_prepared
-from doorstate.errors import CloudError
 from doorstate.simulation.frames import Frame
 from doorstate.simulation.row import Row
 from doorstate.simulation.settings import SimulationSettings
@@ -32,7 +31,9 @@ class Sampler:
     def scratch(self) -> Path:
         """Folder of the clouds until all pieces are done."""
         spec = self.preparation.spec
-        settings = (spec.num_points, spec.max_depth_m, spec.thin, spec.remove_outliers)
+        settings = [spec.num_points, spec.max_depth_m, spec.thin, spec.remove_outliers]
+        if self.preparation.crops is not None:
+            settings += self.preparation.crops.model_dump().values()
         return self.preparation.source / f"sampled-{'-'.join(map(str, settings))}"
 
     def path(self, piece: str) -> Path:
@@ -41,12 +42,10 @@ class Sampler:
 
     def __call__(self, piece: str, rows: Sequence[Row], frames: Sequence[Frame]) -> None:
         """Sample the frames of a piece, and save their clouds."""
-        clouds = PieceClouds(self.preparation.spec.num_points)
-        for frame in frames:
-            try:
-                clouds.add(*sample_frame(frame, self.preparation.spec))
-            except CloudError as error:
-                clouds.reject(error.describe(with_path=False))
+        spec = self.preparation.spec
+        clouds = PieceClouds(spec.num_points)
+        for row, frame in zip(rows, frames, strict=True):
+            clouds.add(samples_of_frame(row, frame, spec, self.preparation.crops))
         clouds.save(self.path(piece))
 
 

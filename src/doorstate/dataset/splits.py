@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from doorstate._files import read_csv, write_csv
+from doorstate.dataset.crops import ADDED
 from doorstate.dataset.pose_blocks import split_poses
 from doorstate.dataset.roles import ROLES, Role
 from doorstate.errors import DatasetError, unknown_name
@@ -55,6 +56,10 @@ def draw_splits(rows: Sequence[Mapping[str, str]], protocol: str, seed: int) -> 
         splits = split_poses(rows, NUM_FOLDS, seed)
     else:
         splits = (_by_scene if protocol == "by-scene" else _by_stratum)(rows, seed)
+    # Doors that the finder missed help in training, but nobody would be asked about them.
+    added = [row["sample_id"] for row in rows if row.get("candidate") == ADDED]
+    for roles in splits:
+        roles |= {sample: "unused" for sample in added if roles[sample] != "train"}
     for fold, roles in enumerate(splits):
         for role in ("train", "val", "test"):
             if role not in roles.values():
@@ -66,7 +71,7 @@ def draw_splits(rows: Sequence[Mapping[str, str]], protocol: str, seed: int) -> 
 
 def origin(row: Mapping[str, str]) -> str:
     """Return the origin that trained and tested samples must not share: the scene, else seed and name."""
-    return row.get("scene_id") or f"{row.get('seed', '')}/{row['sample_id']}"
+    return row.get("scene_id") or f"{row.get('seed', '')}/{row.get('frame_id') or row['sample_id']}"
 
 
 def _by_stratum(rows: Sequence[Mapping[str, str]], seed: int) -> list[dict[str, Role]]:

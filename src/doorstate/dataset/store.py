@@ -19,8 +19,11 @@ from doorstate._documents import read_json
 from doorstate._files import read_csv, write_text
 from doorstate._input import MAX_SETTINGS_BYTES, check_input
 from doorstate._models import FrozenModel
+from doorstate.clouds.normalization import NORMALIZATIONS, Input, Normalization
 from doorstate.clouds.preparation import MAX_NUM_POINTS, CloudSpec
-from doorstate.dataset.sampling import sample_frame
+from doorstate.dataset.crops import Crops, doorway_of, frame_row
+from doorstate.dataset.sampling import sample_crop, sample_frame
+from doorstate.doorways.crop import DEFAULT_CROP
 from doorstate.errors import ConfigError, DatasetError, first_validation_error
 from doorstate.simulation.frames import Frame, replay
 from doorstate.simulation.manifest import MANIFEST_FILE, unflatten
@@ -47,6 +50,12 @@ class DatasetDescription(FrozenModel):
     max_depth_m: float | None = Field(default=None, gt=0)  # points farther ahead were left out
     thin: bool = False  # sampled from some rows and columns of each image, as a predictor does
     remove_outliers: bool = False  # not in data sets of version 0.1
+    crops: Crops | None = None  # of doorways, in the frame of each; None for whole clouds in the sensor frame
+
+    @property
+    def input(self) -> Input:
+        """Clouds that a network gets."""
+        return "whole" if self.crops is None else "doorway"
 
     @property
     def spec(self) -> CloudSpec:
@@ -93,6 +102,11 @@ class PreparedDataset:
     def num_points(self) -> int:
         """Number of points of every cloud."""
         return self.description.num_points
+
+    @property
+    def normalization(self) -> Normalization:
+        """Normalisation of the clouds."""
+        return NORMALIZATIONS[self.description.input]
 
     @property
     def depth_range_m(self) -> float | None:
@@ -165,29 +179,34 @@ class PreparedDataset:
         return np.array(self._parts[indices, :num_points])
 
     def _sample(self, index: int, num_points: int | None) -> tuple[Points, NDArray[np.uint8]]:
-        spec = self.description.spec
-        count = num_points or spec.num_points
+        count = num_points or self.num_points
         if index not in self._sampled or len(self._sampled[index][0]) < count:
-            _cache(
-                self._sampled,
-                index,
-                sample_frame(self._frame(index), spec.model_copy(update={"num_points": count})),
-                _CACHED_CLOUDS,
-            )
+            spec, frame = self.description.spec.model_copy(update={"num_points": count}), self._frame(index)
+            is_whole = self.description.crops is None
+            sampled = sample_frame(frame, spec) if is_whole else sample_crop(frame, self.rows[index], spec)
+            _cache(self._sampled, index, sampled, _CACHED_CLOUDS)
         points, parts = self._sampled[index]
         return points[:count], parts[:count]
 
     def _frame(self, index: int) -> Frame:
         """Render the frame of a row; the last one is cached, because picture and cloud need it."""
         if index not in self._rendered:
-            _cache(self._rendered, index, replay(unflatten(self.rows[index])), 1)
+            _cache(self._rendered, index, replay(frame_row(self.rows[index])), 1)
         return self._rendered[index]
 
     def raw_cloud(self, index: int) -> Points:
-        """Render the cloud (H, W, 3) in metres before sampling; imported data sets return the stored cloud."""
+        """Render the cloud (H, W, 3) in metres before sampling, sensor frame; NaN outside of a crop.
+
+        Imported data sets return the stored cloud.
+        """
+        doorway = None if self.description.crops is None else doorway_of(self.rows[index])
         if self.description.kind != "simulated":
-            return self.cloud(index)
-        return self._frame(index).points.copy()
+            cloud = self.cloud(index)
+            return cloud if doorway is None else doorway.to_sensor(cloud)
+        points = self._frame(index).points.copy()
+        if doorway is not None:
+            points[~DEFAULT_CROP.contains(doorway.to_doorway(points))] = np.nan
+        return points
 
     def raw_clouds(self, count: int) -> list[Points]:
         """Return `raw_cloud` for `count` samples, spread over the data set."""

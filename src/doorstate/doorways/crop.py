@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
@@ -17,13 +19,14 @@ from doorstate.clouds.preparation import (
     too_few_points,
 )
 from doorstate.clouds.samplers import Sampler
-from doorstate.clouds.thinning import CELLS_PER_POINT, PIXELS_PER_POINT, thinned_points
+from doorstate.clouds.thinning import CELLS_PER_POINT, thinned_points
 from doorstate.doorways.doorway import Doorway
 from doorstate.types import Indices, Points
 
 CROP_POINTS = 1024
-_FRAME_PIXELS_PER_POINT = 64  # of a whole image; a doorway 3 m away and its surroundings cover a quarter of it
-_FEW_PIXELS_PER_POINT = 4  # a crop with fewer is taken from all pixels
+_PIXELS_PER_POINT = 6  # least number of pixels in the box for each sampled point, and at most twice as many
+_SEARCH_PIXELS = 16_384  # of an image, in which the box is looked for first
+_POINTS_PER_LEAF = 256  # of the sampler's tree: fastest for 1024 of 10,000 points
 
 
 class CropSpec(FrozenModel):
@@ -61,8 +64,8 @@ def crop_cloud(
 ) -> PreparedCloud:
     """Return the points around a doorway, in its frame and in farthest-point order, each distinct point once.
 
-    They are sampled from every second, third, ... row and column of an image, and from one point in each cell of a
-    grid of a flat cloud, as long as 16 or 8 times `spec.num_points` remain.
+    They are sampled from some of the points in the box: of an image from every second, third, ... row and column,
+    at least 6 pixels for each point, and of a flat cloud from one point in each cell of a grid.
 
     Args:
         cloud: (N, 3) or organized (H, W, 3) metres, level sensor frame, without outliers; NaN, infinite or (0, 0, 0)
@@ -74,14 +77,16 @@ def crop_cloud(
     Raises:
         TooFewPointsError: fewer than 128 distinct points are inside.
     """
-    rows, points = _inside_of_image(cloud, doorway, spec) if cloud.ndim == 3 else _inside(cloud, doorway, spec)
-    if cloud.ndim == 2:
+    if cloud.ndim == 3:
+        rows, points = _inside_of_image(cloud, doorway, spec)
+    else:
+        rows, points = _inside(cloud, doorway, spec)
         kept = thinned_points(points, CELLS_PER_POINT * spec.num_points)
         rows, points = rows[kept], points[kept]
     least = min(spec.num_points, MIN_POINTS)
     if len(points) < least:
         raise too_few_points(f"{len(points)} measured around the doorway")
-    sampled = distinct_farthest_points(points, spec.num_points, sampler)
+    sampled = distinct_farthest_points(points, spec.num_points, sampler, _POINTS_PER_LEAF)
     if len(sampled) < least:
         raise too_few_points(f"{len(sampled)} distinct of {len(points)} measured around the doorway")
     return PreparedCloud(points[sampled], rows[sampled])
@@ -90,29 +95,48 @@ def crop_cloud(
 def _inside(flat: Points, doorway: Doorway, spec: CropSpec) -> tuple[Indices, Points]:
     """Return the rows (n,) of the points (N, 3) in the box, and these points (n, 3) in the doorway's frame."""
     with np.errstate(invalid="ignore", over="ignore"):  # infinite, or as large as some drivers write
-        points = doorway.to_doorway(flat)
+        points = doorway.to_doorway(np.asarray(flat, dtype=np.float32))
         rows = np.flatnonzero(spec.contains(points) & is_measured(flat))
-    return rows, np.asarray(points[rows], dtype=np.float32)
+    return rows, points[rows]
 
 
 def _inside_of_image(image: Points, doorway: Doorway, spec: CropSpec) -> tuple[Indices, Points]:
-    """Return the same of an image (H, W, 3), thinned."""
+    """Return the same of an image (H, W, 3), thinned. The rows are those of the flattened image."""
     height, width, _ = image.shape
-    step = max(1, int(np.sqrt(height * width / (_FRAME_PIXELS_PER_POINT * spec.num_points))))
-    rows, points = _inside_of_grid(image, doorway, spec, step)
-    if step > 1 and len(rows) < _FEW_PIXELS_PER_POINT * spec.num_points:
-        step = 1
-        rows, points = _inside_of_grid(image, doorway, spec, step)
-    stride = step * max(1, int(np.sqrt(len(rows) / (PIXELS_PER_POINT * spec.num_points))))
-    if stride > step:
-        kept = (rows // width % stride == 0) & (rows % width % stride == 0)
-        rows, points = rows[kept], points[kept]
+    # An odd step meets images in which every second row or column is missing.
+    step = int(np.sqrt(height * width / _SEARCH_PIXELS)) | 1
+    everywhere = _Grid(slice(0, height, step), slice(0, width, step))
+    rows, points = _inside_of_grid(image, everywhere, doorway, spec)
+    if len(rows) == 0:
+        return rows, points
+    window = (_around(rows // width, step, height), _around(rows % width, step, width))
+    ratio = max(1.0, len(rows) * step**2 / (_PIXELS_PER_POINT * spec.num_points))
+    down = int(np.sqrt(ratio))
+    across = min(int(ratio / down), down + 1)
+    grid = _Grid(*(slice(side.start, side.stop, by) for side, by in zip(window, (down, across), strict=True)))
+    rows, points = _inside_of_grid(image, grid, doorway, spec)
+    if len(rows) < spec.num_points:  # an even step may meet missing ones only
+        rows, points = _inside_of_grid(image, _Grid(*window), doorway, spec)
     return rows, points
 
 
-def _inside_of_grid(image: Points, doorway: Doorway, spec: CropSpec, step: int) -> tuple[Indices, Points]:
-    """Return the same of every `step`-th row and column of an image."""
-    grid = image[::step, ::step]
-    rows, points = _inside(grid.reshape(-1, 3), doorway, spec)
-    across = grid.shape[1]
-    return rows // across * (step * image.shape[1]) + rows % across * step, points
+class _Grid(NamedTuple):
+    """Rows and columns of an image."""
+
+    rows: slice
+    columns: slice
+
+
+def _inside_of_grid(
+    image: Points, grid: _Grid, doorway: Doorway, spec: CropSpec
+) -> tuple[Indices, Points]:
+    """Return the same of some rows and columns of an image."""
+    height, width, _ = image.shape
+    pixels = np.arange(height)[grid.rows, None] * width + np.arange(width)[grid.columns]
+    rows, points = _inside(image[grid].reshape(-1, 3), doorway, spec)
+    return pixels.reshape(-1)[rows], points
+
+
+def _around(places: Indices, step: int, size: int) -> slice:
+    """Return the range of places in steps, with a step more at both ends."""
+    return slice(max(0, int(places.min()) - step), min(size, int(places.max()) + 2 * step))

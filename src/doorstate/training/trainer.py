@@ -163,6 +163,7 @@ class Trainer:
             (config.seed, config.fold, epoch),
             skip=len(losses),
             limit=recipe.clouds_per_epoch,
+            no_door_share=recipe.no_door_share,
         ):
             rate = self.schedule.rate
             momentum = batchnorm_momentum(recipe, self.schedule.iteration, self.iterations_per_epoch)
@@ -213,12 +214,16 @@ class Trainer:
 
     def _card(self) -> WeightsCard:
         config, dataset = self.config, self.data.dataset
+        source, normalization = dataset.description, dataset.normalization
         extra = f", and {self.data.num_extra} additional samples" if self.data.extra_datasets else ""
         return WeightsCard(
             network=config.network,
             network_options=config.all_network_options,
             num_points=config.num_points,
             heads=config.heads,
-            max_depth_m=dataset.depth_range_m,
-            trained_on=f"{dataset.description.source}, protocol {config.protocol}, fold {config.fold}{extra}",
+            input=source.input,
+            scale_m=normalization.scale_m,
+            # A crop is limited by its box.
+            max_depth_m=dataset.depth_range_m if source.crops is None else None,
+            trained_on=f"{source.source}, protocol {config.protocol}, fold {config.fold}{extra}",
         )
