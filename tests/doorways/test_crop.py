@@ -78,9 +78,7 @@ def test_a_place_without_points_is_refused(frames: list[Frame]) -> None:
         crop_cloud(few, Doorway(2.0, 0.0, 90.0, 0.9, -1.0), SPEC)
 
 
-@given(
-    x_m=st.floats(-5, 5), y_m=st.floats(-5, 5), yaw_deg=st.floats(-360, 360), floor_z_m=st.floats(-2, 0)
-)
+@given(x_m=st.floats(-5, 5), y_m=st.floats(-5, 5), yaw_deg=st.floats(-360, 360), floor_z_m=st.floats(-2, 0))
 @settings(max_examples=50)
 def test_the_frame_of_a_doorway_turns_and_moves_points(
     x_m: float, y_m: float, yaw_deg: float, floor_z_m: float

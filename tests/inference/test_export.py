@@ -9,6 +9,7 @@ import numpy as np
 import onnx
 import pytest
 import torch
+from onnxruntime import InferenceSession
 
 from doorstate.clouds.normalization import NORMALIZATIONS, Input, normalize
 from doorstate.clouds.preparation import CloudSpec, prepare_cloud
@@ -17,13 +18,16 @@ from doorstate.inference.backends.onnx_backend import OnnxBackend
 from doorstate.inference.backends.torch_backend import TorchBackend
 from doorstate.inference.export import OPSET, TOLERANCE, export_onnx
 from doorstate.inference.export.parity import rounding_effect
-from doorstate.inference.reference_clouds import LabelledClouds
+from doorstate.inference.export.refusals import REASONS
+from doorstate.inference.reference_clouds import LabelledClouds, reference_clouds
 from doorstate.networks import create_network, list_networks
 from doorstate.networks.base import PointNetwork
 from doorstate.networks.card import WeightsCard
 from doorstate.networks.head_layers import add_heads, head_outputs
 from doorstate.networks.heads import HEADS
 from doorstate.networks.layers.batch_norm import set_batchnorm
+from doorstate.networks.weights import load_weights, save_weights
+from doorstate.types import Points
 
 OUTPUTS = ["state", "reason", "probabilities", "raw_probabilities"]
 SLOW = {"pointcnn"}
@@ -58,9 +62,44 @@ def network_trained_on(name: str, clouds: LabelledClouds) -> PointNetwork:
     return network.eval()
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name in SLOW)) for name in list_networks()]
-)
+NETWORKS = [pytest.param(name, marks=[pytest.mark.slow] * (name in SLOW)) for name in list_networks()]
+
+
+@pytest.mark.parametrize("name", NETWORKS)
+def test_crops_have_the_same_network_and_another_normalisation(name: str, tmp_path: Path) -> None:
+    crops = reference_clouds(4, 160, cloud_input="doorway")
+    assert np.abs(crops.points[..., :2]).max() <= 1.5
+    torch.manual_seed(0)
+    network, card = create_network(name).train(), card_of(name, "doorway")
+    assert len(network.state_dict()) == len(network_trained_on(name, crops).state_dict())
+    set_batchnorm(network, momentum=1.0)
+    with torch.no_grad():
+        network(torch.from_numpy(card.normalization(crops.points)))
+    add_heads(network, ("door", "frame"))
+    card = card.model_copy(update={"heads": ("door", "frame")})
+    parity = export_onnx(tmp_path / "crops.onnx", network.eval(), card, crops)
+    assert parity.max_difference <= parity.tolerance
+    exported = OnnxBackend(tmp_path / "crops.onnx")
+    assert (exported.card.input, exported.card.scale_m) == ("doorway", 1.5)
+    save_weights(tmp_path / "crops.safetensors", network, card)
+    loaded = TorchBackend(*load_weights(tmp_path / "crops.safetensors"))
+    expected = TorchBackend(network, card)(crops.points)
+    np.testing.assert_array_equal(loaded(crops.points).probabilities, expected.probabilities)
+    np.testing.assert_array_equal(loaded(crops.points).heads["door_x_m"], expected.heads["door_x_m"])
+    whole = TorchBackend(network, card_of(name).model_copy(update={"heads": card.heads}))(crops.points)
+    assert np.abs(whole.probabilities - expected.probabilities).max() > 1e-3
+    outside = crops.points + np.float32([1.6, 0, 0])
+    reasons = onnxruntime_reasons(tmp_path / "crops.onnx", outside)
+    assert set(reasons) == {REASONS.index("unusable_cloud")}
+    assert not set(onnxruntime_reasons(tmp_path / "crops.onnx", crops.points)) & set(reasons)
+
+
+def onnxruntime_reasons(path: Path, points: Points) -> list[int]:
+    (reasons,) = InferenceSession(path).run(["reason"], {"points": points})
+    return list(reasons)
+
+
+@pytest.mark.parametrize("name", NETWORKS)
 def test_the_file_agrees_with_torch(name: str, clouds: LabelledClouds, tmp_path: Path) -> None:
     path, network = tmp_path / "network.onnx", network_trained_on(name, clouds)
     parity = export_onnx(path, network, card_of(name), clouds)
@@ -123,7 +162,9 @@ def test_int8_is_a_quarter_of_the_size_and_differs(clouds: LabelledClouds, tmp_p
 def test_a_file_that_differs_from_torch_is_not_written(
     clouds: LabelledClouds, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def of_larger_clouds(network: PointNetwork, points: torch.Tensor, **options: bool) -> dict[str, torch.Tensor]:
+    def of_larger_clouds(
+        network: PointNetwork, points: torch.Tensor, **options: bool
+    ) -> dict[str, torch.Tensor]:
         return head_outputs(network, 1.5 * points, **options)  # type: ignore[arg-type]
 
     monkeypatch.setattr("doorstate.inference.export.graph.head_outputs", of_larger_clouds)

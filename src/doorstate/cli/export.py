@@ -55,7 +55,7 @@ def export(
     check_writable(path)
     loaded, card = load_weights(file)
     with progress_bar("Simulating clouds") as progress:
-        references = reference_clouds(clouds, points or card.points_in_use, progress)
+        references = reference_clouds(clouds, points or card.points_in_use, progress, card.input)
     with progress_bar(f"Exporting {name}") as progress:
         result = export_onnx(path, loaded, card, references, opset=opset, int8=int8, progress=progress)
     stdout.print(

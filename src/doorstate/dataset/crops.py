@@ -21,7 +21,7 @@ from doorstate.doorways.finder import find_doorways
 from doorstate.simulation.manifest import flatten, unflatten
 from doorstate.simulation.noise.streams import sample_seed, stage_rng
 from doorstate.simulation.row import Row
-from doorstate.simulation.truth import TrueDoor, true_doors
+from doorstate.simulation.truth import DOOR_COLUMNS, TrueDoor, main_columns, true_doors
 from doorstate.types import NO_DOOR, Points
 
 Columns = Mapping[str, str]
@@ -32,22 +32,6 @@ _ADDED_SIGMAS = (0.08, 0.05, 3.0)  # the finder's errors: metres along the wall 
 _MOST_SIGMAS = 2.0
 _VISIBLE_SHARE = 0.005  # of the image: leaf, frame or opening of a door that can be seen
 _POSE = ("x_m", "y_m", "yaw_deg", "width_m", "floor_z_m")
-_DOOR_COLUMNS = (
-    "state",
-    "door_kind",
-    "hinge",
-    "swing",
-    "opening_angle_deg",
-    "passive_angle_deg",
-    "opening_share",
-    "opening_width_m",
-    "opening_height_m",
-    "passable_width_m",
-    "door_x_m",
-    "door_y_m",
-    "door_z_m",
-    "door_yaw_deg",
-)
 
 
 class Crops(FrozenModel):
@@ -127,7 +111,7 @@ def _missed(row: Row, candidates: Sequence[Doorway]) -> list[tuple[Doorway, True
         along_m, across_m, turn_deg = (
             float(sigma * np.clip(rng.normal(), -_MOST_SIGMAS, _MOST_SIGMAS)) for sigma in _ADDED_SIGMAS
         )
-        if sum(door.visible_px) < least_px or any(_is_hit(door, doorway) for doorway in candidates):
+        if _visible_px(door) < least_px or any(_is_hit(door, doorway) for doorway in candidates):
             continue
         yaw = math.radians(door.yaw_deg)
         doorway = Doorway(
@@ -143,16 +127,28 @@ def _missed(row: Row, candidates: Sequence[Doorway]) -> list[tuple[Doorway, True
 
 def _columns(row: Row, doorway: Doorway, door: TrueDoor | None, sample_id: str, candidate: str) -> Columns:
     """Return the columns of a crop that shows a door, or none, in place of those of its frame."""
-    of_frame = {name: text for name, text in flatten(row).items() if name in _DOOR_COLUMNS}
-    in_crop = dict.fromkeys(of_frame, "") | {"state": NO_DOOR}
-    if door is not None:
-        in_crop = of_frame | {name: _text(value) for name, value in _in_doorway(door, doorway).items()}
+    of_frame = flatten(row)
+    in_crop = {name: _text(value) for name, value in _door_columns(door, doorway).items()}
     return {
         "sample_id": sample_id,
         **in_crop,
         **_candidate_columns(row.sample_id, doorway, candidate),
-        **{f"{_FRAME}{name}": text for name, text in of_frame.items()},
+        **{f"{_FRAME}{name}": of_frame[name] for name in in_crop},
     }
+
+
+def _door_columns(door: TrueDoor | None, doorway: Doorway) -> dict[str, object]:
+    """Return the columns of the door in a crop, in the frame of the doorway; empty ones without a door."""
+    if door is None:
+        return dict.fromkeys(DOOR_COLUMNS) | {"state": NO_DOOR, "ambiguous": False}
+    x_m, y_m, z_m = doorway.to_doorway(np.array([door.x_m, door.y_m, door.floor_z_m])).tolist()
+    pose = {
+        "x_m": round(x_m, 5),
+        "y_m": round(y_m, 5),
+        "floor_z_m": round(z_m, 5),
+        "yaw_deg": round(_difference_deg(door.yaw_deg, doorway.yaw_deg), 4),
+    }
+    return main_columns(door.model_copy(update=pose))
 
 
 def _candidate_columns(frame_id: str, doorway: Doorway, candidate: str) -> dict[str, str]:
@@ -164,21 +160,8 @@ def _text(value: object) -> str:
     return "" if value is None else str(value)
 
 
-def _in_doorway(door: TrueDoor, doorway: Doorway) -> dict[str, object]:
-    """Return the columns of a door in the frame of a doorway."""
-    x_m, y_m, z_m = doorway.to_doorway(np.array([door.x_m, door.y_m, door.floor_z_m])).tolist()
-    return {
-        "state": door.state,
-        "hinge": door.hinge,
-        "opening_angle_deg": door.opening_angle_deg,
-        "opening_width_m": door.width_m,
-        "opening_height_m": door.height_m,
-        "passable_width_m": door.passable_width_m,
-        "door_x_m": round(x_m, 5),
-        "door_y_m": round(y_m, 5),
-        "door_z_m": round(z_m, 5),
-        "door_yaw_deg": round(_difference_deg(door.yaw_deg, doorway.yaw_deg), 4),
-    }
+def _visible_px(door: TrueDoor) -> int:
+    return door.visible_px.leaf + door.visible_px.frame + door.visible_px.opening
 
 
 def _is_hit(door: TrueDoor, doorway: Doorway) -> bool:

@@ -26,7 +26,7 @@ from doorstate.doorways.doorway import Doorway
 from doorstate.errors import CloudContentError, CloudError, DoorstateError
 from doorstate.simulation.frames import Frame
 from doorstate.simulation.row import Row
-from doorstate.types import Points
+from doorstate.types import NO_DOOR, Points
 
 _NO_DOORWAY: Final = "no doorway was found"
 
@@ -83,7 +83,9 @@ def samples_of_frame(row: Row, frame: Frame, spec: CloudSpec, crops: Crops | Non
             samples.append(Sample(*_with_parts(frame, _crop(cloud, doorway, spec)), columns))
         except CloudError as error:
             samples.append(rejected_sample(error, columns))
-    return samples
+    # Too few points around a place without a door are no loss.
+    useful = [sample for sample in samples if not sample.reason or sample.columns["state"] != NO_DOOR]
+    return useful or samples[:1]
 
 
 def samples_of_recording(row: Columns, points: Points, spec: CloudSpec, crops: Crops | None) -> list[Sample]:

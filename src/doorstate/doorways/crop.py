@@ -127,9 +127,7 @@ class _Grid(NamedTuple):
     columns: slice
 
 
-def _inside_of_grid(
-    image: Points, grid: _Grid, doorway: Doorway, spec: CropSpec
-) -> tuple[Indices, Points]:
+def _inside_of_grid(image: Points, grid: _Grid, doorway: Doorway, spec: CropSpec) -> tuple[Indices, Points]:
     """Return the same of some rows and columns of an image."""
     height, width, _ = image.shape
     pixels = np.arange(height)[grid.rows, None] * width + np.arange(width)[grid.columns]

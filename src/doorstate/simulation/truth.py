@@ -24,6 +24,8 @@ _COLUMNS = {  # of the main door, by field of `TrueDoor`
     "passable_width_m": "passable_width_m",
 }
 _OPTIONAL = ("opening_angle_deg", "passive_angle_deg", "opening_share")
+DOOR_COLUMNS = (*_COLUMNS.values(), *_OPTIONAL)
+"""Columns of `main_columns`."""
 
 
 def true_doors(row: Row) -> tuple[TrueDoor, ...]:

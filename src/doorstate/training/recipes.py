@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Training recipes: one common to all networks, its form for doorways, and those that the networks' authors published."""
+"""Training recipes: one common to all networks, its form for doorways, and those of the authors of the networks."""
 
 from __future__ import annotations
 

@@ -93,12 +93,11 @@ def _encode_line(line: Line) -> dict[str, Any]:
 
 def _channel_counts(predictor: Predictor, points: Points) -> NDArray[np.float32] | None:
     """Return (N,) channel counts of the points; None where these are not defined."""
-    network = predictor.backend.network if isinstance(predictor, NetworkPredictor) else None
-    if network is None:
+    if not isinstance(predictor, NetworkPredictor) or (network := predictor.backend.network) is None:
         return None
     from doorstate.viewer.critical_points import critical_points  # needs torch, an exported network does not
 
-    return critical_points(network, points)
+    return critical_points(network, points, predictor.backend.card.normalization)
 
 
 def render_cloud_page(predictor: Predictor, entries: Sequence[Entry], *, live: bool = False) -> str:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional
 
-from doorstate.clouds.normalization import normalize
+from doorstate.clouds.normalization import NORMALIZATIONS, Normalization
 from doorstate.networks.base import PointNetwork
 from doorstate.networks.dgcnn import DGCNN
 from doorstate.networks.kernels.winners import first_winner
@@ -30,7 +30,9 @@ from doorstate.networks.pointnet2 import PointNet2
 from doorstate.types import Points
 
 
-def critical_points(network: PointNetwork, points: Points) -> NDArray[np.float32] | None:
+def critical_points(
+    network: PointNetwork, points: Points, normalization: Normalization = NORMALIZATIONS["whole"]
+) -> NDArray[np.float32] | None:
     """Count the channels of the global feature by the point that they come from.
 
     DGCNN's edge convolutions and the mean half of its feature are not followed: its points stand for their neighbours.
@@ -38,12 +40,13 @@ def critical_points(network: PointNetwork, points: Points) -> NDArray[np.float32
     Args:
         network: network in evaluation mode.
         points: (N, 3) metres in farthest-point order.
+        normalization: of the clouds that the network takes.
 
     Returns:
         (N,) counts, whole numbers for PointNet and DGCNN, which sum to the number of channels above zero; None for
         networks without a maximum over points.
     """
-    cloud = torch.from_numpy(normalize(points))[None]
+    cloud = torch.from_numpy(normalization(points))[None]
     with torch.inference_mode():
         if isinstance(network, DGCNN):
             counts = _count_in_dgcnn(network, cloud)

@@ -7,6 +7,7 @@ import json
 from dataclasses import asdict
 from typing import NamedTuple
 
+from doorstate.clouds.normalization import Input
 from doorstate.inference.backends.onnx_backend import PROBABILITIES, RAW_PROBABILITIES, REASON, head_names
 from doorstate.inference.export.refusals import REASONS, REFUSED
 from doorstate.inference.gate import Gate
@@ -14,12 +15,16 @@ from doorstate.networks.card import WeightsCard
 from doorstate.networks.heads import HEADS, STATE
 from doorstate.types import DOOR, STATES
 
-_PROGRAM = (
-    "before sampling, remove outliers and cut the cloud at max_depth_m of the card; refuse raw clouds as `gate` says. "
+_PROGRAM: dict[Input, str] = {
+    "whole": "before sampling, remove outliers and cut the cloud at max_depth_m of the card; refuse raw clouds as "
+    "`gate` says. "
     "The graph makes its checks of points behind the camera, range, extent and view on the smallest and largest values "
     "of the sampled points; the number of points, the measured share, medians, quantiles, holes and, of open doors, "
-    "the floor behind the opening are left to the program"
-)
+    "the floor behind the opening are left to the program",
+    "doorway": "before sampling, level the cloud, remove outliers, find the doorways and turn the points around each "
+    "into its frame; refuse clouds and doorways in which too much is missing. The graph refuses points outside of the "
+    "box of a crop",
+}
 
 
 class Output(NamedTuple):
@@ -62,6 +67,6 @@ def describe_refusals(card: WeightsCard, gate: Gate | None) -> dict[str, str]:
     return {
         "outputs": json.dumps([output._asdict() for output in list_outputs(card)]),
         "reasons": json.dumps([code or "" for code in REASONS]),
-        "gate": json.dumps(None if gate is None else asdict(gate)),
-        "left_to_the_program": _PROGRAM,
+        "gate": json.dumps(None if gate is None or card.input == "doorway" else asdict(gate)),
+        "left_to_the_program": _PROGRAM[card.input],
     }

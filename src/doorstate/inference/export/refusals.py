@@ -13,6 +13,7 @@ from collections.abc import Mapping
 import torch
 from torch import Tensor, nn
 
+from doorstate.doorways.crop import DEFAULT_CROP
 from doorstate.inference.abstention import AbstentionCode
 from doorstate.inference.gate import Gate
 from doorstate.inference.validity import SUM_TOLERANCE
@@ -21,7 +22,7 @@ from doorstate.types import DECISION_THRESHOLD, DOOR
 
 REASONS: tuple[AbstentionCode | None, ...] = (
     None,
-    "unusable_cloud",  # a point is not finite, (0, 0, 0), or beyond the range of the training clouds
+    "unusable_cloud",  # a point is not finite, (0, 0, 0), or beyond the range or the box of the training clouds
     "points_behind_camera",
     "too_near",
     "too_far",
@@ -33,6 +34,7 @@ REASONS: tuple[AbstentionCode | None, ...] = (
 )
 """Reasons by their number in the output `reason`; the first that holds is given."""
 REFUSED = -1  # in the output `state`
+_ROUNDING_M = 1e-3
 _BEHIND_SHARE = 0.25  # chosen: sampling picks stray points first; an optical frame or a scan has half
 
 
@@ -41,14 +43,15 @@ class Refusals(nn.Module):
 
     Args:
         card: card of the weights.
-        gate: limits of the sampled points; None for none.
+        gate: limits of the sampled points, of whole clouds; None for none.
     """
 
     def __init__(self, card: WeightsCard, gate: Gate | None) -> None:
         super().__init__()
+        self.is_crop = card.input == "doorway"
         self.max_depth_m = math.inf if card.max_depth_m is None else card.max_depth_m
         self.abstain_below = card.abstain_below
-        self.gate = gate
+        self.gate = None if self.is_crop else gate
 
     def forward(self, points: Tensor, probabilities: Tensor, heads: Mapping[str, Tensor]) -> Tensor:
         """Return (B,) numbers in `REASONS`.
@@ -58,7 +61,8 @@ class Refusals(nn.Module):
             probabilities: (B, 3).
             heads: (B, num_values) decoded values by head.
         """
-        checks = {"unusable_cloud": _unusable(points, self.max_depth_m)}
+        beyond = _outside_of_crop(points) if self.is_crop else points[:, :, :1] > self.max_depth_m
+        checks = {"unusable_cloud": _unusable(points) | beyond.flatten(1).any(1)}
         if self.gate is not None:
             checks |= _gate_checks(points, self.gate)
         checks["invalid_outputs"] = _invalid(probabilities, heads)
@@ -73,11 +77,17 @@ class Refusals(nn.Module):
         return reason
 
 
-def _unusable(points: Tensor, max_depth_m: float) -> Tensor:
+def _unusable(points: Tensor) -> Tensor:
     wrong = ~points.isfinite() | (points == 0).all(2, keepdim=True)
-    if max_depth_m < math.inf:
-        wrong = wrong | (points[:, :, :1] > max_depth_m)
     return wrong.flatten(1).any(1)
+
+
+def _outside_of_crop(points: Tensor) -> Tensor:
+    """Return the mask (B, N, 3) of coordinates outside of the box of a crop, with a hair for rounding."""
+    box = DEFAULT_CROP
+    lowest = torch.tensor([-box.half_width_m, -box.behind_m, box.bottom_m]) - _ROUNDING_M
+    highest = torch.tensor([box.half_width_m, box.before_m, box.top_m]) + _ROUNDING_M
+    return (points < lowest) | (points > highest)
 
 
 def _gate_checks(points: Tensor, gate: Gate) -> dict[str, Tensor]:
