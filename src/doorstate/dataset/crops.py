@@ -98,8 +98,8 @@ def frame_row(line: Columns) -> Row:
 
 def doorway_of(line: Columns) -> Doorway:
     """Return the doorway at which the crop of a line was taken, in the sensor frame."""
-    pose = {name: float(line[f"doorway_{name}"]) for name in _POSE}
-    return Doorway(**pose, score=float(line["finder_score"]))
+    x_m, y_m, yaw_deg, width_m, floor_z_m = (float(line[f"doorway_{name}"]) for name in _POSE)
+    return Doorway(x_m, y_m, yaw_deg, width_m, floor_z_m, score=float(line["finder_score"]))
 
 
 def _missed(row: Row, candidates: Sequence[Doorway]) -> list[tuple[Doorway, TrueDoor]]:
