@@ -35,6 +35,7 @@ PAGES = (
     "docs/tutorial.md",
     "docs/inputs.md",
     "docs/deployment.md",
+    "docs/doors.md",
     "docs/onnx.md",
     "docs/view.md",
 )

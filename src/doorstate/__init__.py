@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The state of a door from one depth-camera point cloud.
 
-The public names are `Predictor`, `Prediction`, `Gate`, `StateFilter`, `wait_for`, `DoorState`, `read_cloud`,
-`ReadOptions`, `create_network` and `list_networks`; each is imported when it is first used, so that `import doorstate`
-and the command line's help stay quick.
+The public names are `Predictor`, `Prediction`, `Door`, `DoorHint`, `Gate`, `StateFilter`, `wait_for`, `DoorState`,
+`read_cloud`, `ReadOptions`, `create_network` and `list_networks`; each is imported when it is first used, so that
+`import doorstate` and the command line's help stay quick.
 """
 
 from __future__ import annotations
@@ -12,7 +12,9 @@ from importlib import import_module
 
 TYPE_CHECKING = False  # importing the module typing takes longer than all that is imported here
 if TYPE_CHECKING:
+    from doorstate.inference.door import Door
     from doorstate.inference.gate import Gate
+    from doorstate.inference.known import DoorHint
     from doorstate.inference.prediction import Prediction
     from doorstate.inference.predictor import Predictor
     from doorstate.inference.state_filter import StateFilter
@@ -24,6 +26,8 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 __all__ = [
+    "Door",
+    "DoorHint",
     "DoorState",
     "Gate",
     "Prediction",
@@ -37,6 +41,8 @@ __all__ = [
 ]
 
 _HOME = {
+    "Door": "doorstate.inference.door",
+    "DoorHint": "doorstate.inference.known",
     "DoorState": "doorstate.types",
     "Gate": "doorstate.inference.gate",
     "Prediction": "doorstate.inference.prediction",

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 from doorstate.cli import console
+from doorstate.cli.prediction_output import WRITERS
 from doorstate.cli.prediction_table import PredictionTable
 from tests.cli.helpers import Run
 
@@ -116,6 +117,64 @@ def folder(cloud: np.ndarray, tmp_path: Path) -> Path:
         (path / f"{number}.csv").write_text("foo,bar\n" + "1,2\n" * 300)
     (path / "bad\x1b[31m.npy").write_bytes(b"nothing")
     return path
+
+
+DOORS = [
+    {
+        "state": "open",
+        "x_m": 3.0,
+        "y_m": 0.0,
+        "yaw_deg": 90.0,
+        "width_m": 0.9,
+        "distance_m": 3.0,
+        "bearing_deg": 0.0,
+    },
+    {
+        "state": None,
+        "reason": "unsure",
+        "raw_probabilities": {"closed": 0.4, "semi_open": 0.35, "open": 0.25},
+        "x_m": 2.0,
+        "y_m": 2.0,
+        "yaw_deg": 135.0,
+        "width_m": 1.0,
+        "distance_m": 2.828,
+        "bearing_deg": 45.0,
+        "position_error_m": 0.05,
+    },
+]
+
+
+def test_further_doors_stand_below_their_cloud(monkeypatch: pytest.MonkeyPatch) -> None:
+    lines = printed([("corridor/left/frame-000123.pcd", ANSWER | {"doors": DOORS})], monkeypatch, width=100)
+    assert len(lines) == 4
+    assert "3.00 m" in lines[1]
+    assert "door 2, 45° left" in lines[2]
+    assert "2.83 m" in lines[2]
+    assert "abstained" in lines[2]
+    assert "unsure" in lines[3]
+    short = printed([("a.pcd", ANSWER | {"doors": DOORS})], monkeypatch, width=100)
+    assert len({line.index("2.83 m" if "2.83 m" in line else "3.00 m") for line in short[1:3]}) == 1
+
+
+def test_a_csv_file_has_a_row_for_each_door() -> None:
+    stream = io.StringIO()
+    write = WRITERS[".csv"](stream, "file")
+    write({"file": "a.pcd"} | ANSWER | {"doors": DOORS})
+    write({"file": "b.pcd"} | REFUSED)
+    write({"file": "c.pcd", "error": "empty"})
+    first, second, refused, error = csv.DictReader(io.StringIO(stream.getvalue()))
+    assert [row["door"] for row in (first, second, refused, error)] == ["1", "2", "", ""]
+    assert {row["file"] for row in (first, second)} == {"a.pcd"}
+    assert {row["points"] for row in (first, second)} == {"1024"}
+    assert (first["state"], first["door_x_m"], first["opening_width_m"]) == ("open", "3.0", "0.9")
+    assert (second["state"], second["door_y_m"], second["bearing_deg"], second["position_error_m"]) == (
+        "",
+        "2.0",
+        "45.0",
+        "0.05",
+    )
+    assert (second["reason"], second["closed"]) == ("unsure", "")
+    assert (error["error"], error["state"]) == ("empty", "")
 
 
 def test_alike_errors_are_one_line(run: Run, weights: Path, folder: Path) -> None:

@@ -226,8 +226,7 @@ def test_heads_are_in_metres_and_degrees(headed: Path, small_dataset: PreparedDa
     with torch.no_grad():
         outputs = head_outputs(predictor.backend.network, torch.from_numpy(normalize(prepared)))
     columns = head_columns(
-        {name: outputs[name].numpy() for name in HEADS},
-        prepared.mean(axis=1, dtype=np.float64).astype(np.float32),
+        {name: outputs[name].numpy() for name in HEADS}, predictor.card.normalization.placement(prepared)
     )
     assert prediction.door_probability == pytest.approx(columns["p_door"][0])
     assert prediction.opening_angle_deg == pytest.approx(columns["opening_angle_deg"][0])

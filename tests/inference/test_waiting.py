@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from doorstate.errors import CloudContentError, ConfigError
+from doorstate.inference.door import Door
 from doorstate.inference.prediction import Prediction
 from doorstate.inference.waiting import wait_for
 from doorstate.types import DoorState, Points
@@ -46,6 +47,19 @@ def test_a_last_frame_that_differs_delays_the_end() -> None:
     assert wait_for("open", stamped(*held, (1, predict(OPEN))), 60.0)
     assert not wait_for("open", stamped(*held, (1, predict(CLOSED))), 60.0)
     assert wait_for("open", stamped(*held, (1, predict(CLOSED)), (4, predict(OPEN))), 60.0)
+
+
+def test_an_open_door_without_a_visible_leaf_may_be_glass() -> None:
+    def seen(leaf_seen: bool | None) -> Prediction:
+        probabilities = predict(OPEN).raw_probabilities
+        door = Door(3.0, 0.0, 90.0, 0.9, OPEN, raw_probabilities=probabilities, leaf_seen=leaf_seen)
+        return Prediction.from_doors([door], [], 1024, 1.0)
+
+    assert wait_for("open", stamped((40, seen(True))), 60.0)
+    assert wait_for("open", stamped((40, seen(None))), 60.0)
+    assert not wait_for("open", stamped((40, seen(False))), 60.0)
+    assert wait_for("open", stamped((40, seen(False))), 60.0, require_leaf=False)
+    assert wait_for("open", stamped((40, seen(False)), (1, seen(True))), 60.0)
 
 
 def test_clouds_go_through_the_predictor_and_its_errors_are_raised() -> None:

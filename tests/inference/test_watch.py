@@ -3,24 +3,29 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from array import array
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from doorstate.errors import ConfigError, WeightsError
 from doorstate.inference.abstention import Abstention
+from doorstate.inference.door import Door
 from doorstate.inference.door_report import DoorReport
+from doorstate.inference.known import Known
 from doorstate.inference.network_predictor import NetworkPredictor
 from doorstate.inference.prediction import Prediction
 from doorstate.inference.predictor import Predictor
 from doorstate.inference.rule_predictor import RulePredictor
+from doorstate.inference.tilt import Tilt
 from doorstate.inference.waiting import wait_for
 from doorstate.inference.watch import DoorWatch
 from doorstate.inference.watch_settings import WatchSettings, parse_settings
@@ -42,11 +47,12 @@ class CachedPredictor(NetworkPredictor):
         super().__init__(*arguments, **options)
         self._predictions: dict[bytes, Prediction] = {}
 
-    def __call__(self, points: Points) -> Prediction:
+    def _predict(self, clouds: Sequence[Points], known: Known) -> list[Prediction]:
+        (points,) = clouds
         content = points.tobytes()
         if content not in self._predictions:
-            self._predictions[content] = super().__call__(points)
-        return self._predictions[content]
+            (self._predictions[content],) = super()._predict(clouds, known)
+        return [self._predictions[content]]
 
 
 @pytest.fixture(scope="module")
@@ -244,6 +250,72 @@ def test_values_and_text_have_everything(clouds: list[Points]) -> None:
     assert report.text == f"semi_open {float(values['filtered_semi_open']):.0%}"
     unknown = DoorWatch(WatchSettings(rule="depth_region")).report_silence(START_NS)
     assert unknown.text == f"unknown\n{unknown.prediction.reason}"
+
+
+class Answers(Predictor):
+    """Predictor that gives the same doors for every cloud."""
+
+    name = "answers"
+    gate, removes_outliers = None, False
+
+    def __init__(self, *doors: Door, tilt: Tilt | None = None) -> None:
+        self._doors, self._tilt = doors, tilt
+        self.known: list[Known] = []
+
+    def _predict(self, clouds: Sequence[Points], known: Known) -> list[Prediction]:
+        self.known.append(known)
+        return [Prediction.from_doors(self._doors, [], 1024, 1.0, self._tilt) for _ in clouds]
+
+
+@pytest.mark.parametrize("optical", [True, False])
+@pytest.mark.parametrize("tilt", [None, Tilt(5.0, 20.0, "floor")])
+def test_doors_are_in_the_frame_of_the_message(
+    tilt: Tilt | None, optical: bool, clouds: list[Points]
+) -> None:
+    """The axes of a door in the frame of the message lead from points of the door to those of the level frame."""
+    door = Door(3.0, 0.5, 80.0, 0.9, DoorState.OPEN, hinge="left", opening_angle_deg=90.0, floor_z_m=-1.0)
+    predictor = Answers(door, Door(2.0, -2.0, 20.0, 0.8, DoorState.CLOSED), tilt=tilt)
+    watch = DoorWatch(
+        parse_settings({"axes": "optical" if optical else "ros", "door_known": True}), predictor
+    )
+    report = watch.process(cloud_message(to_optical(clouds[0]) if optical else clouds[0]), 0)
+    assert predictor.known == [Known(door=True)]
+
+    def in_message(point: list[float]) -> Any:
+        body = np.array(point) if tilt is None else tilt.from_level(np.array(point))
+        return to_optical(body) if optical else body
+
+    first, second = report.poses
+    np.testing.assert_allclose(first.position_m, in_message([3.0, 0.5, -1.0]), atol=1e-6)
+    assert second.position_m.shape == (3,)
+    # Half a metre before the door, one metre up.
+    yaw = np.radians(80.0)
+    place = [3.0 - 0.5 * np.sin(yaw), 0.5 + 0.5 * np.cos(yaw), 0.0]
+    turned = Rotation.from_quat(first.quaternion).apply([0.0, 0.5, 1.0]) + first.position_m
+    np.testing.assert_allclose(turned, in_message(place), atol=1e-6)
+    frame = next(line for line in report.lines if line.name == "door frame")
+    assert frame.label == "1: open"
+    left = [3.0 + 0.45 * np.cos(yaw), 0.5 + 0.45 * np.sin(yaw), -1.0]
+    assert np.abs(frame.points_m - in_message(left)).sum(axis=1).min() < 1e-6
+    listed = json.loads(report.doors)
+    assert [(item["state"], item["x_m"], item["yaw_deg"]) for item in listed] == [
+        ("open", 3.0, 80.0),
+        ("closed", 2.0, 20.0),
+    ]
+    assert report.values["doors"] == "2"
+    assert ("found_pitch_deg" in report.values) == (tilt is not None)
+
+
+@pytest.mark.parametrize(
+    ("leaf_seen", "require_leaf", "is_open"), [(False, True, False), (False, False, True), (True, True, True)]
+)
+def test_the_way_is_free_with_a_visible_leaf(
+    leaf_seen: bool, require_leaf: bool, is_open: bool, clouds: list[Points]
+) -> None:
+    door = Door(3.0, 0.5, 80.0, 0.9, DoorState.OPEN, leaf_seen=leaf_seen)
+    watch = DoorWatch(WatchSettings(require_leaf=require_leaf), Answers(door))
+    report = at_10_hz(watch, [clouds[0]] * 25)[-1]
+    assert (report.state, report.is_open) == ("open", is_open)
 
 
 def test_parameters_choose_the_predictor(weights: object) -> None:

@@ -6,7 +6,7 @@ from __future__ import annotations
 import io
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from doorstate.errors import ConfigError
 from doorstate.inference.abstention import Abstention
+from doorstate.inference.known import Known
 from doorstate.inference.prediction import Prediction
 from doorstate.inference.predictor import Predictor
 from doorstate.serving.access import Access
@@ -45,7 +46,10 @@ class MeanPredictor(Predictor):
     def name(self) -> str:
         return "mean"
 
-    def __call__(self, cloud: NDArray[np.float32]) -> Prediction:
+    def _predict(self, clouds: Sequence[NDArray[np.float32]], known: Known) -> list[Prediction]:
+        return [self._answer(cloud) for cloud in clouds]
+
+    def _answer(self, cloud: NDArray[np.float32]) -> Prediction:
         order = float(np.nan_to_num(cloud.reshape(-1, 3)[:1, :1]).sum())
         if order == WAIT and self._folder is not None:
             (self._folder / "arrived").touch()

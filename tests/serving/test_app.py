@@ -179,7 +179,8 @@ def test_openapi_describes_the_interface(client: httpx.Client) -> None:
     assert "application/octet-stream" in predict["requestBody"]["content"]
     assert set(predict["responses"]) == {"200", *map(str, STATUS_DESCRIPTIONS)}
     schemas = description["components"]["schemas"]
-    assert set(schemas) == {"PredictionResponse", "SensorPoseResponse", "HealthResponse", "ErrorResponse"}
+    names = ("Prediction", "Door", "Tilt", "SensorPose", "Health", "Error")
+    assert set(schemas) == {f"{name}Response" for name in names}
     for status, response in predict["responses"].items():
         name = response["content"]["application/json"]["schema"]["$ref"].rpartition("/")[2]
         assert name == ("PredictionResponse" if status == "200" else "ErrorResponse")

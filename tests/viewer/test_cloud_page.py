@@ -10,13 +10,17 @@ import re
 import numpy as np
 import pytest
 
+from doorstate.clouds.leveling import Leveling
 from doorstate.clouds.preparation import CloudSpec, prepare_cloud
 from doorstate.inference.network_predictor import NetworkPredictor
 from doorstate.inference.rule_predictor import RulePredictor
+from doorstate.io.options import ReadOptions
+from doorstate.io.rotations import tilt_matrix
 from doorstate.types import Part
-from doorstate.viewer.cloud_page import Entry, make_entry, render_cloud_page
+from doorstate.viewer.cloud_page import Entry, Shown, make_entry, render_cloud_page
 from doorstate.viewer.critical_points import critical_points
 from doorstate.viewer.named_clouds import NamedCloud
+from tests.inference.scripted_doorways import FLOOR_M, doorway, outputs, room, scripted_predictor
 
 
 def decoded(text: str, kind: str) -> np.ndarray:
@@ -50,6 +54,30 @@ def test_entries_without_parts_state_or_cloud(entries: list[Entry]) -> None:
     assert glass["prediction"]["reason"]
     assert "channels" not in glass, "the gate abstained, so that no network was used"
     assert broken == {"name": "broken.pcd", "truth": "", "error": "not a PCD file"}
+
+
+def test_doors_of_a_tilted_cloud_are_drawn_over_the_level_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    cloud, rotation = room(), np.array(tilt_matrix(5.0, 20.0))
+    tilted = (cloud @ rotation).astype(np.float32)
+    level = Leveling(cloud, rotation, "floor", 0.4, FLOOR_M)
+    script = [outputs("open"), outputs("closed", 0.9), outputs("closed", 0.1)]
+    found = [doorway(3.0), doorway(2.5, 40.0), doorway(2.0, -50.0)]
+    for refused in (False, True):
+        predictor = scripted_predictor(monkeypatch, found, script, leveling=level)
+        entry = make_entry(
+            predictor, NamedCloud("tilted", tilted, pose=ReadOptions().pose()), shown=Shown(False, refused)
+        )
+        labels = [line["label"] for line in entry["detections"] if line["label"]]
+        assert labels == ["1: open", "90°", "2: closed", "0°", *(["no door (0.10)"] * refused)]
+    frame = next(line for line in entry["detections"] if line["name"] == "door frame")
+    np.testing.assert_allclose(np.array(frame["points"])[:, 0], 3.0, atol=1e-3)
+    whole = decoded(entry["whole"]["points"], "<i2").reshape(-1, 3) / 1000
+    assert entry["floor_z_m"] == pytest.approx(FLOOR_M, abs=0.05)
+    assert whole[:, 2].min() >= FLOOR_M - 0.001
+    assert decoded(entry["cloud"]["points"], "<i2").size == 3 * 3 * 128
+    assert "channels" not in entry
+    assert [door["state"] for door in entry["prediction"]["doors"]] == ["open", "closed"]
+    assert entry["prediction"]["tilt"]["pitch_deg"] == pytest.approx(20.0)
 
 
 def test_entry_of_a_rule_holds_its_detections(clouds: list[NamedCloud]) -> None:

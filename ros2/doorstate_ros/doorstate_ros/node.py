@@ -12,7 +12,7 @@ from typing import Any
 import rclpy
 from builtin_interfaces.msg import Duration, Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from geometry_msgs.msg import Point
+from geometry_msgs.msg import Point, Pose, PoseArray, Quaternion
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.clock import Clock, ClockType
 from rclpy.executors import ExternalShutdownException
@@ -24,7 +24,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from doorstate.errors import DoorstateError
 from doorstate.inference.backends.threads import configure_torch
-from doorstate.inference.door_report import UNKNOWN, DoorReport
+from doorstate.inference.door_report import UNKNOWN, DoorPose, DoorReport
 from doorstate.inference.watch import DoorWatch
 from doorstate.inference.watch_settings import WatchSettings, parse_settings
 
@@ -60,6 +60,8 @@ class DoorNode:
         self._watch = DoorWatch(settings)
         self._state = node.create_publisher(String, "~/state", LATCHED)
         self._open = node.create_publisher(Bool, "~/open", LATCHED)
+        self._doors = node.create_publisher(String, "~/doors", 1)
+        self._poses = node.create_publisher(PoseArray, "~/poses", 1)
         self._diagnostics = node.create_publisher(DiagnosticArray, "~/diagnostics", 1)
         self._markers = node.create_publisher(MarkerArray, "~/markers", 1)
         self._marker_lifetime = Duration(sec=int(2 * settings.silence_s) + 1)
@@ -93,6 +95,8 @@ class DoorNode:
         self._state.publish(String(data=report.state))
         self._open.publish(Bool(data=report.is_open))
         header = Header(frame_id=report.frame_id, stamp=stamp(report.stamp_ns))
+        self._doors.publish(String(data=report.doors))
+        self._poses.publish(PoseArray(header=header, poses=[pose(door) for door in report.poses]))
         self._diagnostics.publish(
             DiagnosticArray(header=header, status=[diagnostic(self._node, report, level)])
         )
@@ -133,7 +137,7 @@ def diagnostic(node: Node, report: DoorReport, level: bytes) -> DiagnosticStatus
 
 
 def markers(header: Header, report: DoorReport, lifetime: Duration) -> list[Marker]:
-    """Return a label and the detections of a rule; they replace all earlier markers."""
+    """Return a label, the detections of a rule and the doors; they replace all earlier markers."""
     red, green, blue = COLOURS[report.state]
     common: dict[str, Any] = {
         "header": header,
@@ -149,12 +153,29 @@ def markers(header: Header, report: DoorReport, lifetime: Duration) -> list[Mark
         lines.scale.x = LINE_WIDTH_M
         lines.points = [point(corner) for corner in detection.points_m]
         drawn.append(lines)
+    for number, line in enumerate(report.lines):
+        lines = Marker(ns=f"doors/{line.name}", id=number, type=Marker.LINE_STRIP, **common)
+        lines.scale.x = LINE_WIDTH_M
+        lines.points = [point(place) for place in line.points_m]
+        drawn.append(lines)
+        if line.label:
+            text = Marker(
+                ns="doors/label", id=number, type=Marker.TEXT_VIEW_FACING, text=line.label, **common
+            )
+            text.scale.z = TEXT_HEIGHT_M
+            text.pose.position = point(line.points_m[-1])
+            drawn.append(text)
     return drawn
 
 
 def point(place_m: Iterable[float]) -> Point:
     x, y, z = (float(metres) for metres in place_m)
     return Point(x=x, y=y, z=z)
+
+
+def pose(door: DoorPose) -> Pose:
+    x, y, z, w = door.quaternion
+    return Pose(position=point(door.position_m), orientation=Quaternion(x=x, y=y, z=z, w=w))
 
 
 def main(args: Sequence[str] | None = None) -> int:

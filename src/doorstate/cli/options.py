@@ -59,6 +59,26 @@ Threads = Annotated[
 
 Every = Annotated[int, typer.Option("--every", help="Use only every Nth file or message.", min=1)]
 
+# Doors that are known to be in view.
+DoorKnownFlag = Annotated[
+    bool, typer.Option("--door-known", help="A door is known to be in view: no door is no answer.")
+]
+DoorPose = Annotated[
+    str | None,
+    typer.Option(
+        metavar="PLACE",
+        help="Rough place of that door, as from a map: 'x y', 'x y yaw' or 'x y yaw width' of its opening, in metres"
+        " forward and left of the camera and degrees. For weights of doorways.",
+    ),
+]
+DoorBox = Annotated[
+    str | None,
+    typer.Option(
+        metavar="BOX",
+        help="In place of --door-pose: 'left top right bottom' of a box around the door, in pixels.",
+    ),
+]
+
 # Recordings.
 Bag = Annotated[
     Path | None,

@@ -15,6 +15,9 @@ from doorstate.cli.options import (
     Bag,
     BudgetMs,
     CameraInfoTopic,
+    DoorBox,
+    DoorKnownFlag,
+    DoorPose,
     Every,
     NetworkNames,
     PointCount,
@@ -30,6 +33,7 @@ from doorstate.errors import CloudReadError, ConfigError, DoorstateError
 
 if TYPE_CHECKING:
     from doorstate.dataset.frame_index import IndexedOptions
+    from doorstate.inference.known import DoorKnown
     from doorstate.inference.predictor import Predictor
     from doorstate.io.options import ReadOptions
     from doorstate.io.sensor_pose import PosedCloud
@@ -46,6 +50,9 @@ def predict(
     points: PointCount = None,
     budget_ms: BudgetMs = None,
     threads: Threads = None,
+    door_known: DoorKnownFlag = False,
+    door_pose: DoorPose = None,
+    door_box: DoorBox = None,
     as_json: AsJson = False,
     bag: Bag = None,
     topic: Topic = None,
@@ -57,7 +64,7 @@ def predict(
     *,
     options: ReadOptions,
 ) -> None:
-    """Predict the state of the door in clouds.
+    """Predict the states of the doors in clouds.
 
     Clouds come from files, depth images or the messages of a ROS bag. Files: .pcd .ply .npy .npz .xyz .txt .csv,
     depth .png. Several networks and rules answer side by side. The exit code is 1 if a file or message could not be
@@ -70,6 +77,7 @@ def predict(
       doorstate predict recordings/ --out states.csv
       doorstate predict --network pointnet2 --rule plane_state --rule angle_bins cloud.pcd
       doorstate predict --network ogurob-dgcnn --budget-ms 33 recordings/
+      doorstate predict --door-known cloud.pcd
       doorstate predict depth.png --fx 385.9 --fy 385.4 --cx 317.8 --cy 243.7
       doorstate predict depth.png --intrinsics camera_info.yaml --roll 90
       doorstate predict --bag run.bag --topic /camera/depth/points --out run.csv
@@ -77,6 +85,7 @@ def predict(
     from doorstate.cli.predict_bag import predict_bag
     from doorstate.cli.predictors import Methods, load_predictors
     from doorstate.dataset.frame_index import IndexedOptions
+    from doorstate.inference.known import door_known as known_door
 
     check_source(files, bag)
     if bag is None and (topic, camera_info_topic) != (None, None):
@@ -86,6 +95,7 @@ def predict(
     if out is not None and out.suffix not in WRITERS:
         raise ConfigError(f"--out {out}: expected a {' or '.join(WRITERS)} file")
     methods = Methods(network, weights, rule)
+    door = known_door(door_known, door_pose, door_box)
     if bag is not None:
         output = Output("stamp_s", "message", out, as_json)
         # The predictor is loaded after the bag was opened, because it takes longer.
@@ -97,12 +107,13 @@ def predict(
             camera_info_topic,
             every,
             output,
+            door,
         )
         return
     sources = _find(files or [])[::every]
     predictors = load_predictors(methods, points, budget_ms=budget_ms, threads=threads)
     indexed = IndexedOptions(options)
-    clouds = (_predict_file(predictors, source, indexed) for source in sources)
+    clouds = (_predict_file(predictors, source, indexed, door) for source in sources)
     names = [_name(source) for source in sources if isinstance(source, Path)]
     Output("file", "file", out, as_json).write(clouds, list(predictors), names, len(sources))
 
@@ -123,7 +134,10 @@ def _find(paths: list[Path]) -> list[Path | CloudReadError]:
 
 
 def _predict_file(
-    predictors: Mapping[str, Predictor], source: Path | CloudReadError, options: IndexedOptions
+    predictors: Mapping[str, Predictor],
+    source: Path | CloudReadError,
+    options: IndexedOptions,
+    door: DoorKnown,
 ) -> Rows:
     from doorstate.io.readers import read_posed_cloud
 
@@ -133,7 +147,7 @@ def _predict_file(
         ]
     row = {"file": _name(source)}
     try:
-        return [*_predict(predictors, read_posed_cloud(source, options.of(source)), row)]
+        return [*_predict(predictors, read_posed_cloud(source, options.of(source)), door, row)]
     except DoorstateError as error:
         return [row | {"error": error.describe(format_flag, with_path=False)}]
     except MemoryError:
@@ -141,12 +155,13 @@ def _predict_file(
 
 
 def _predict(
-    predictors: Mapping[str, Predictor], cloud: PosedCloud, row: dict[str, Any]
+    predictors: Mapping[str, Predictor], cloud: PosedCloud, door: DoorKnown, row: dict[str, Any]
 ) -> Iterator[dict[str, Any]]:
+    from doorstate.inference.posed import predict_posed
     from doorstate.inference.serialization import prediction_to_dict, require_points
 
     for method, predictor in predictors.items():
-        prediction = require_points(predictor(cloud.points))
+        prediction = require_points(predict_posed(predictor, *cloud, door))
         yield row | {"method": method} | prediction_to_dict(prediction, format_flag, cloud.pose)
 
 

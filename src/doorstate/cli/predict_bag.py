@@ -12,6 +12,7 @@ from doorstate.cli.prediction_output import Output, Rows
 from doorstate.errors import CloudReadError, DoorstateError
 
 if TYPE_CHECKING:
+    from doorstate.inference.known import DoorKnown
     from doorstate.inference.predictor import Predictor
     from doorstate.io.bags import StampedCloud
     from doorstate.io.options import ReadOptions
@@ -25,6 +26,7 @@ def predict_bag(
     camera_info_topic: str | None,
     every: int,
     output: Output,
+    door: DoorKnown,
 ) -> None:
     """Write predictions for every Nth message of a topic.
 
@@ -36,6 +38,7 @@ def predict_bag(
         camera_info_topic: topic of the camera; None for the usual one.
         every: N.
         output: where the predictions go.
+        door: True, or a rough place, where a door is known to be in view.
     """
     from doorstate.io.bags import open_bag
 
@@ -43,12 +46,15 @@ def predict_bag(
         chosen = bag.choose(topic)
         predictors = load()
         messages = bag.clouds(chosen, options, camera_info_topic, every)
-        clouds = _predict_messages(predictors, messages)
+        clouds = _predict_messages(predictors, messages, door)
         output.write(clouds, list(predictors), [f"{0:.6f}".rjust(17)], -(-chosen.messages // every))
 
 
-def _predict_messages(predictors: Mapping[str, Predictor], clouds: Iterable[StampedCloud]) -> Iterator[Rows]:
+def _predict_messages(
+    predictors: Mapping[str, Predictor], clouds: Iterable[StampedCloud], door: DoorKnown
+) -> Iterator[Rows]:
     """Yield the rows of each message; a bag that is damaged from somewhere on ends with an error row."""
+    from doorstate.inference.posed import predict_posed
     from doorstate.inference.serialization import prediction_to_dict
 
     try:
@@ -57,10 +63,11 @@ def _predict_messages(predictors: Mapping[str, Predictor], clouds: Iterable[Stam
             try:
                 if isinstance(cloud, DoorstateError):
                     raise cloud
-                yield [
-                    row | {"method": method} | prediction_to_dict(predictor(cloud), format_flag, pose)
-                    for method, predictor in predictors.items()
-                ]
+                rows = []
+                for method, predictor in predictors.items():
+                    prediction = predict_posed(predictor, cloud, pose, door)
+                    rows.append(row | {"method": method} | prediction_to_dict(prediction, format_flag, pose))
+                yield rows
             except DoorstateError as error:
                 yield [row | {"error": error.describe(format_flag, with_path=False)}]
     except CloudReadError as error:

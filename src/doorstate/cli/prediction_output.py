@@ -105,20 +105,39 @@ def _json_writer(stream: TextIO, key: str) -> Write:
 
 
 def _csv_writer(stream: TextIO, key: str) -> Write:
-    from doorstate.inference.serialization import OPTIONAL_FIELDS
+    from doorstate.inference.serialization import DOOR_FIELDS, OPTIONAL_FIELDS
     from doorstate.types import STATES
 
-    columns = [key, "method", "state", *STATES, "points", "milliseconds", *OPTIONAL_FIELDS, "reason", "error"]
+    common = [key, "method", "points", "milliseconds"]
+    of_doors = [name for name in DOOR_FIELDS if name not in OPTIONAL_FIELDS and name not in _PLACE]
+    columns = [key, "method", "door", "state", *STATES, "points", "milliseconds"]
+    columns += [*OPTIONAL_FIELDS, *of_doors, "reason", "error"]
     writer = csv.DictWriter(stream, columns, lineterminator="\n")
     writer.writeheader()
 
     def write(row: dict[str, Any]) -> None:
-        flat = row | (row.get("probabilities") or {})
-        if isinstance(flat[key], str):
-            flat[key] = csv_name(flat[key])
-        writer.writerow({column: flat.get(column) for column in columns})
+        for one in _by_door(row, common):
+            flat = one | (one.get("probabilities") or {})
+            if isinstance(flat[key], str):
+                flat[key] = csv_name(flat[key])
+            writer.writerow({column: flat.get(column) for column in columns})
 
     return write
+
+
+def _by_door(row: dict[str, Any], columns: Sequence[str]) -> Iterator[dict[str, Any]]:
+    """Yield a row for each door, numbered from the one that the prediction is about; one row where there are none."""
+    doors = row.get("doors")
+    if not doors:
+        yield row
+        return
+    common = {column: row[column] for column in columns if column in row}
+    for number, door in enumerate(doors, 1):
+        yield common | {_PLACE.get(name, name): value for name, value in door.items()} | {"door": number}
+
+
+# Columns of a door's place, which the fields of a single door have as well.
+_PLACE = {"x_m": "door_x_m", "y_m": "door_y_m", "yaw_deg": "door_yaw_deg", "width_m": "opening_width_m"}
 
 
 WRITERS: dict[str, Callable[[TextIO, str], Write]] = {".csv": _csv_writer, ".jsonl": _json_writer}

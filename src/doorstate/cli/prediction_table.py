@@ -42,9 +42,22 @@ def _probability(row: dict[str, Any]) -> str:
 
 
 def _distance(row: dict[str, Any]) -> str:
+    door = (row.get("doors") or [row])[0]
+    if "distance_m" in door:
+        return f"{door['distance_m']:.2f} m"
     if row["state"] is None or row.get("door_x_m") is None:
         return _MISSING
     return f"{math.hypot(row['door_x_m'], row['door_y_m']):.2f} m"
+
+
+def _milliseconds(row: dict[str, Any]) -> str:
+    return f"{row['milliseconds']:.0f}" if "milliseconds" in row else ""
+
+
+def _side(bearing_deg: float) -> str:
+    """Return the direction of a door in words."""
+    degrees = round(abs(bearing_deg))
+    return "ahead" if degrees == 0 else f"{degrees}° {'left' if bearing_deg > 0 else 'right'}"
 
 
 _COLUMNS = (
@@ -52,7 +65,7 @@ _COLUMNS = (
     _Column("angle", 5, _number("opening_angle_deg", "{:.0f}°")),
     _Column("passable", 8, _number("passable_width_m", "{:.2f} m")),
     _Column("distance", 8, _distance),
-    _Column("ms", 5, lambda row: f"{row['milliseconds']:.0f}"),
+    _Column("ms", 5, _milliseconds),
 )
 _STATE_WIDTH = 9
 _CELLS_WIDTH = len(_GAP) + _STATE_WIDTH + sum(len(_GAP) + column.width for column in _COLUMNS)
@@ -91,13 +104,21 @@ class PredictionTable:
         if self._by_method and name != self._last_name:
             console.stdout.print(name, style="bold")
         self._last_name = name
-        line = Text(_fit(f"  {row['method']}" if self._by_method else printable(name), self._name_width))
-        state = row["state"]
+        self._print_answer(f"  {row['method']}" if self._by_method else printable(name), row)
+        for number, door in enumerate(row.get("doors", ())[1:], 2):
+            indent = "    " if self._by_method else "  "
+            label = f"{indent}door {number}, {_side(door['bearing_deg'])}"
+            self._print_answer(label if len(label) <= self._name_width else f"{indent}{number}", door)
+
+    def _print_answer(self, name: str, answer: dict[str, Any]) -> None:
+        """Print a prediction, or one of its further doors."""
+        line = Text(_fit(name, self._name_width))
+        state = answer["state"]
         line.append(f"{_GAP}{state or ABSTAINED:<{_STATE_WIDTH}}", _STATE_STYLES.get(state, "bold"))
         for column in _COLUMNS:
-            line.append(f"{_GAP}{column.cell(row):>{column.width}}")
+            line.append(f"{_GAP}{column.cell(answer):>{column.width}}")
         console.stdout.print(line)
-        if reason := row.get("reason"):
+        if reason := answer.get("reason"):
             self._print_reason(printable(reason))
 
     def _print_titles(self) -> None:

@@ -15,6 +15,9 @@ from doorstate.cli.options import (
     Bag,
     BudgetMs,
     CameraInfoTopic,
+    DoorBox,
+    DoorKnownFlag,
+    DoorPose,
     Every,
     NetworkNames,
     PointCount,
@@ -75,6 +78,12 @@ def view(
     bag: Bag = None,
     topic: Topic = None,
     camera_info_topic: CameraInfoTopic = None,
+    door_known: DoorKnownFlag = False,
+    door_pose: DoorPose = None,
+    door_box: DoorBox = None,
+    refused: Annotated[
+        bool, typer.Option("--refused", help="Draw candidate doorways that are no doors, too.")
+    ] = False,
     *,
     options: ReadOptions,
 ) -> None:
@@ -94,10 +103,13 @@ def view(
     from doorstate._files import check_writable
     from doorstate.cli.predictors import Methods, load_predictor
     from doorstate.cli.view_output import show_live, show_page
+    from doorstate.inference.known import door_known as known_door
+    from doorstate.viewer.cloud_page import Shown
 
     check_source(files, bag)
     if bag is None and (topic, camera_info_topic) != (None, None):
         raise ConfigError("--topic and --camera-info-topic need --bag")
+    shown = Shown(known_door(door_known, door_pose, door_box), refused)
     if not live and (rate, port) != (None, 0):
         raise ConfigError("--rate and --port need --live")
     if live and (out is not None or (files and (len(files) > 1 or not files[0].is_dir()))):
@@ -118,9 +130,9 @@ def view(
             Methods(network, weights, rule), points, budget_ms=budget_ms, threads=threads, for_view=True
         )
         if live:
-            show_live(predictor, clouds, port, open_browser)
+            show_live(predictor, clouds, port, open_browser, shown)
         else:
-            show_page(predictor, clouds, total, out, open_browser)
+            show_page(predictor, clouds, total, out, open_browser, shown)
 
 
 def _find_files(paths: list[Path], options: ReadOptions, every: int) -> Clouds:

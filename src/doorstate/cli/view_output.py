@@ -19,6 +19,7 @@ from doorstate.cli.progress import progress_bar
 
 if TYPE_CHECKING:
     from doorstate.inference.predictor import Predictor
+    from doorstate.viewer.cloud_page import Shown
     from doorstate.viewer.named_clouds import NamedCloud
 
 _LARGE_PAGE_BYTES = 50_000_000  # browsers take seconds to open it
@@ -30,6 +31,7 @@ def show_page(
     total: int,
     out: Path | None,
     open_browser: bool,
+    shown: Shown,
 ) -> None:
     """Write a page with all clouds; exit with code 1 if a cloud could not be shown.
 
@@ -39,6 +41,7 @@ def show_page(
         total: their number, for the progress bar.
         out: file to write; None writes a temporary file and opens it in the browser.
         open_browser: False only prints the path.
+        shown: known door, and candidates to draw.
     """
     from doorstate._files import write_text
     from doorstate.viewer.cloud_page import make_entry, render_cloud_page
@@ -47,7 +50,7 @@ def show_page(
     errors: list[tuple[str, str]] = []
     with progress_bar("Predicting") as progress:
         for cloud in clouds:
-            entry = make_entry(predictor, cloud, format_flag)
+            entry = make_entry(predictor, cloud, format_flag, shown)
             if "error" in entry:
                 errors.append((entry["name"], entry["error"]))
             entries.append(entry)
@@ -69,7 +72,9 @@ def show_page(
         raise typer.Exit(1)
 
 
-def show_live(predictor: Predictor, clouds: Iterable[NamedCloud], port: int, open_browser: bool) -> None:
+def show_live(
+    predictor: Predictor, clouds: Iterable[NamedCloud], port: int, open_browser: bool, shown: Shown
+) -> None:
     """Serve a page that shows clouds as they arrive, until Ctrl-C.
 
     Args:
@@ -77,6 +82,7 @@ def show_live(predictor: Predictor, clouds: Iterable[NamedCloud], port: int, ope
         clouds: clouds to show; may wait for the next one.
         port: port on this machine; 0 chooses a free one.
         open_browser: False only prints the address.
+        shown: known door, and candidates to draw.
     """
     from doorstate.viewer.cloud_page import make_entry, render_cloud_page
     from doorstate.viewer.live_page import LivePage
@@ -88,7 +94,7 @@ def show_live(predictor: Predictor, clouds: Iterable[NamedCloud], port: int, ope
             _open_in_browser(page.address)
         try:
             for cloud in clouds:
-                page.publish("cloud", make_entry(predictor, cloud, format_flag))
+                page.publish("cloud", make_entry(predictor, cloud, format_flag, shown))
             page.publish("end", None)
             # Short sleeps: if another thread gets the signal of Ctrl-C, this one notices it only when it wakes up.
             while True:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -66,3 +67,15 @@ def check_single_cloud(points: Points) -> Points:
             hint="give several clouds one by one, and points without an order as (N, 3)",
         )
     return cloud
+
+
+def check_batch(clouds: Sequence[Points]) -> Sequence[Points]:
+    """Return several clouds as they are, after checking that they are not one.
+
+    Raises:
+        CloudContentError: one cloud, (N, 3) or an image (H, W, 3).
+    """
+    whole = np.asarray(clouds) if hasattr(clouds, "ndim") else None
+    if whole is not None and (whole.ndim == 2 or (whole.ndim == 3 and is_image(whole))):
+        raise CloudContentError(f"this is one cloud, {whole.shape}: give several, or call the predictor")
+    return clouds

@@ -29,6 +29,8 @@ AbstentionCode = Literal[
     "invalid_outputs",  # of the network: not finite, or no probabilities
     "door_hole",  # a dark or glass leaf, or an open door into nothing
     "opening_not_seen",  # called open, but the floor behind the opening was not measured
+    "no_floor",  # neither in view nor known
+    "no_doorway",  # no wall with a place for a door
     "no_door",
     "unsure",
     "no_rule_result",
@@ -71,6 +73,8 @@ SENTENCES: dict[AbstentionCode, str] = {
         "called open, but only {share:.0%} of the rays to the floor behind the opening came back, {min_share:.0%} are "
         "needed: a dark or glass leaf, or missing data"
     ),
+    "no_floor": "the floor is not in view, and the height of the camera is not given",
+    "no_doorway": "no wall in view has a place for a door",
     "no_door": "there seems to be no door: its probability is {probability:.2f}",
     "unsure": "unsure: {state} has probability {probability:.2f}, these weights need {min_probability:.2f}",
     "no_message": "no message for {silence_s:g} s",

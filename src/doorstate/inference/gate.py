@@ -3,9 +3,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +15,10 @@ from doorstate.clouds.measured import is_measured
 from doorstate.clouds.preparation import MIN_POINTS
 from doorstate.errors import ConfigError
 from doorstate.inference.abstention import Abstention
+from doorstate.inference.door import Door
 from doorstate.inference.holes import find_holes
 from doorstate.inference.seen_through import Opening, seen_share
-from doorstate.types import Points
+from doorstate.types import DoorState, Points
 
 _SHARES = (
     "min_measured_share",
@@ -30,6 +32,13 @@ _SHARES = (
 _MAX_MARGIN_SHARE = 0.4
 _LARGE_IMAGE_ROWS = 240  # from here on every other row and column is enough
 _STATISTICS_POINTS = 8192
+
+
+class DoorwayCheck(NamedTuple):
+    """Result of a check of one door."""
+
+    abstention: Abstention | None  # reason why its state is refused
+    leaf_seen: bool | None = None  # of an open door; None where nobody looked
 
 
 @dataclass(frozen=True)
@@ -100,10 +109,6 @@ class Gate:
                 was measured. Holes are searched in organized clouds and in flat ones.
             outlier_share: share of its measured points that was removed before (`clouds.outliers`).
         """
-        if outlier_share > self.max_outlier_share:
-            values = {"share": outlier_share, "max_share": self.max_outlier_share}
-            return Abstention("outliers", values)
-        view = _View.from_cloud(np.asarray(cloud))
         checks = (
             self._enough_points,
             self._enough_measured,
@@ -113,7 +118,29 @@ class Gate:
             self._wide_enough,
             self._without_holes,
         )
-        return next((abstention for check in checks if (abstention := check(view))), None)
+        return self._first_reason(cloud, outlier_share, checks)
+
+    def check_view(self, cloud: Points, outlier_share: float = 0.0) -> Abstention | None:
+        """Return the reason why no doorway can be searched for in a cloud, or None if one can; arguments as for a call.
+
+        Doorways are checked one by one (`check_doorway`), so that a hole beside them is no reason.
+        """
+        checks = (
+            self._enough_points,
+            self._in_front_of_the_camera,
+            self._near_enough_and_not_covered,
+        )
+        return self._first_reason(cloud, outlier_share, checks)
+
+    def check_doorway(self, cloud: Points, door: Door) -> DoorwayCheck:
+        """Return what a level cloud shows of a door that a network has given a state.
+
+        Args:
+            cloud: as for a call, level.
+            door: door in the frame of the cloud.
+        """
+        abstention = self.check_opening(cloud, door.opening) if door.state is DoorState.OPEN else None
+        return DoorwayCheck(abstention)
 
     def check_opening(self, cloud: Points, opening: Opening) -> Abstention | None:
         """Return the reason why an opening that a network or rule calls open is none, or None if it may be one.
@@ -127,6 +154,15 @@ class Gate:
         if share is None or share >= self.min_seen_share:
             return None
         return Abstention("opening_not_seen", {"share": share, "min_share": self.min_seen_share})
+
+    def _first_reason(
+        self, cloud: Points, outlier_share: float, checks: Sequence[Callable[[_View], Abstention | None]]
+    ) -> Abstention | None:
+        if outlier_share > self.max_outlier_share:
+            values = {"share": outlier_share, "max_share": self.max_outlier_share}
+            return Abstention("outliers", values)
+        view = _View.from_cloud(np.asarray(cloud))
+        return next((abstention for check in checks if (abstention := check(view))), None)
 
     def _enough_points(self, view: _View) -> Abstention | None:
         if len(view.points) >= -(-self.min_points // view.pixels_per_reading):

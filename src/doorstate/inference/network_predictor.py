@@ -10,18 +10,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from doorstate._organized import is_image
 from doorstate.clouds.outliers import CleanCloud
 from doorstate.clouds.preparation import MIN_POINTS, CloudSpec, PreparedCloud, prepare_cloud
 from doorstate.clouds.shape import check_single_cloud
-from doorstate.errors import CloudContentError, ConfigError, TooFewPointsError
+from doorstate.errors import ConfigError, TooFewPointsError
 from doorstate.inference.abstention import Abstention
 from doorstate.inference.backends import Backend, load_backend, run_by_size
 from doorstate.inference.budget import largest_within_budget
 from doorstate.inference.decode import decode
 from doorstate.inference.gate import DEFAULT_GATE, Gate
+from doorstate.inference.known import Known
 from doorstate.inference.prediction import Prediction
 from doorstate.inference.predictor import DEFAULT_NETWORK, Predictor
+from doorstate.networks.card import WeightsCard
 from doorstate.types import Points
 
 _NO_POINTS = np.empty((0, 3), np.float32)
@@ -105,14 +106,26 @@ class NetworkPredictor(Predictor):
             raise ConfigError(f"a call needs a thread, not {threads}", field="threads", expected="1 or more")
         loaded = load_backend(name_or_path, threads, backend)
 
+        predictor = cls._for_input(loaded.card)
+
         def with_points(count: int | None) -> NetworkPredictor:
-            return cls(loaded, count, thin=thin, gate=gate, clock=clock)
+            return predictor(loaded, count, thin=thin, gate=gate, clock=clock)
 
         if budget_ms is None:
             return with_points(num_points)
         if loaded.num_points is not None:
             return with_points(loaded.num_points)
         return largest_within_budget(with_points, loaded.card.num_points, budget_ms)
+
+    @classmethod
+    def _for_input(cls, card: WeightsCard) -> type[NetworkPredictor]:
+        """Return the class for the clouds that weights take."""
+        if card.input == "whole":
+            return cls
+        # The subclass imports this module.
+        from doorstate.inference.doorway_predictor import DoorwayPredictor
+
+        return DoorwayPredictor
 
     @property
     def name(self) -> str:
@@ -121,32 +134,32 @@ class NetworkPredictor(Predictor):
     def __str__(self) -> str:
         return f"{self.name}, {self.num_points} points"
 
-    def __call__(self, cloud: Points) -> Prediction:
-        return self.batch([cloud])[0]
-
-    def batch(self, clouds: Sequence[Points]) -> list[Prediction]:
-        """Predict the states of the doors in several clouds; equally large ones pass the network together.
-
-        Returns:
-            One prediction a cloud, in their order; `milliseconds` is an equal share of the time of all.
-
-        Raises:
-            CloudContentError: an array that is no cloud or not in metres, or one cloud in place of several.
-        """
+    def _predict(self, clouds: Sequence[Points], known: Known) -> list[Prediction]:
+        """Return the predictions; equally large clouds pass the network together."""
+        self._check_hint(known)
         started = self.clock()
-        checked = [check_single_cloud(cloud) for cloud in _check_batch(clouds)]
-        samples = [self._sample(cloud) for cloud in checked]
+        samples = [self._sample(check_single_cloud(cloud)) for cloud in clouds]
         accepted = [sample.points for sample in samples if sample.abstention is None]
         outputs = iter(run_by_size(self.backend, accepted))
         milliseconds = (self.clock() - started) * 1000 / max(1, len(samples))
-        return [
-            self._confirm(decode(next(outputs), self.card.abstain_below, len(points), milliseconds), clean)
-            if abstention is None
-            else Prediction.abstain(abstention, len(points), milliseconds)
-            for points, clean, abstention in samples
-        ]
 
-    def prepare(self, cloud: Points) -> PreparedCloud:
+        def answer(sample: _Sample) -> Prediction:
+            if sample.abstention is not None:
+                return Prediction.abstain(sample.abstention, len(sample.points), milliseconds)
+            prediction = decode(
+                next(outputs),
+                self.card.abstain_below,
+                len(sample.points),
+                milliseconds,
+                door_known=known.has_door,
+            )
+            return self._confirm(prediction, sample.clean)
+
+        return [answer(sample) for sample in samples]
+
+    def prepare(
+        self, cloud: Points, *, is_level: bool = False, camera_height_m: float | None = None
+    ) -> PreparedCloud:
         """Return the points that the network evaluates.
 
         Raises:
@@ -156,7 +169,14 @@ class NetworkPredictor(Predictor):
         return self._prepare(cloud, self.spec)
 
     def _prepare(self, cloud: Points, spec: CloudSpec) -> PreparedCloud:
-        prepared = prepare_cloud(cloud, spec)
+        return self._enough(prepare_cloud(cloud, spec))
+
+    def _enough(self, prepared: PreparedCloud) -> PreparedCloud:
+        """Return the prepared cloud, if the network takes that many points.
+
+        Raises:
+            TooFewPointsError: it does not.
+        """
         if self.backend.num_points is not None and len(prepared.points) < self.backend.num_points:
             raise TooFewPointsError(
                 f"too few points: {len(prepared.points)} distinct, but the exported network takes "
@@ -189,10 +209,3 @@ class _Sample(NamedTuple):
     points: Points  # (n, 3) in farthest-point order
     clean: CleanCloud  # that they were sampled from
     abstention: Abstention | None = None
-
-
-def _check_batch(clouds: Sequence[Points]) -> Sequence[Points]:
-    whole = np.asarray(clouds) if hasattr(clouds, "ndim") else None
-    if whole is not None and (whole.ndim == 2 or (whole.ndim == 3 and is_image(whole))):
-        raise CloudContentError(f"this is one cloud, {whole.shape}: give several, or call the predictor")
-    return clouds

@@ -1,32 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Prediction for one cloud: the state of the door, its probabilities, and where the door is."""
+"""Prediction for one cloud: the doors in it, and the state of the one most in front."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from doorstate.inference.abstention import Abstention
+from doorstate.inference.door import Door, DoorFrame, Hinge
 from doorstate.inference.seen_through import Opening
+from doorstate.inference.tilt import Tilt
 from doorstate.inference.validity import are_probabilities
 from doorstate.rules.base import Detection
 from doorstate.types import ABSTAINED, STATES, DoorState
-
-
-class DoorFrame(NamedTuple):
-    """Pose of the door frame in the sensor frame: the middle of the opening and the direction of the wall.
-
-    The yaw is that of the wall towards its left; a wall straight ahead has 90 degrees.
-    """
-
-    x_m: float
-    y_m: float
-    yaw_deg: float
 
 
 @dataclass(frozen=True)
@@ -34,6 +23,8 @@ class Prediction:
     """State of the door in one cloud, or the reason why there is none.
 
     Numbers that the method does not estimate are None. Without a state there are no probabilities and no geometry.
+    Where the method finds several doors, the fields of a single door are those of the one most in front
+    (`Door.remoteness_m`), or of the one that was asked for.
     """
 
     state: DoorState | None
@@ -47,12 +38,15 @@ class Prediction:
         None  # that the cloud shows a door at all, even where the state is refused
     )
     opening_angle_deg: float | None = None
-    hinge: Literal["left", "right"] | None = None  # as seen from the camera
+    hinge: Hinge | None = None  # as seen from the camera
     hinge_probability: float | None = None  # that the hinge is on this side
     frame: DoorFrame | None = None
     opening_width_m: float | None = None
     passable_width_m: float | None = None  # between leaf and jamb
     detections: tuple[Detection, ...] = field(default=(), compare=False, repr=False)  # of a rule
+    doors: tuple[Door, ...] = ()  # in the level sensor frame, the one of the fields above first
+    refused: tuple[Door, ...] = field(default=(), compare=False, repr=False)  # candidates that are no doors
+    tilt: Tilt | None = None  # of a camera whose cloud was turned level; None: the cloud was taken as it is
 
     @property
     def label(self) -> str:
@@ -73,10 +67,7 @@ class Prediction:
     def opening(self) -> Opening | None:
         """Ends of the door's opening in plan view; None where the method does not find any."""
         if self.frame is not None and self.opening_width_m is not None:
-            yaw = math.radians(self.frame.yaw_deg)
-            x_m, y_m = (self.opening_width_m / 2 * part for part in (math.cos(yaw), math.sin(yaw)))
-            frame = self.frame
-            return Opening((frame.x_m + x_m, frame.y_m + y_m), (frame.x_m - x_m, frame.y_m - y_m))
+            return Opening.in_frame(*self.frame, self.opening_width_m)
         outline = self._outline("opening")
         return None if outline is None else Opening.from_outline(outline)
 
@@ -90,6 +81,21 @@ class Prediction:
 
     def _outline(self, name: str) -> NDArray[np.float64] | None:
         return next((shape.points_m for shape in self.detections if shape.name == name), None)
+
+    @property
+    def leaf_seen(self) -> bool | None:
+        """False if no leaf was seen at an open door, so that glass cannot be excluded; None where nobody looked."""
+        return self.doors[0].leaf_seen if self.doors else None
+
+    def confirms(self, state: DoorState, *, require_leaf: bool = True) -> bool:
+        """Return True for this state; an open door without a visible leaf may be glass, and confirms nothing.
+
+        Args:
+            state: state to confirm.
+            require_leaf: False takes an open door for open although no leaf was seen.
+        """
+        is_glass_possible = state is DoorState.OPEN and self.leaf_seen is False
+        return self.state is state and not (require_leaf and is_glass_possible)
 
     @property
     def is_evidence(self) -> bool:
@@ -116,6 +122,54 @@ class Prediction:
             frame=None,
             opening_width_m=None,
             passable_width_m=None,
+            doors=(),
+        )
+
+    @classmethod
+    def from_doors(
+        cls,
+        doors: Sequence[Door],
+        refused: Sequence[Door],
+        num_points: int,
+        milliseconds: float,
+        tilt: Tilt | None = None,
+    ) -> Prediction:
+        """Return the prediction of a cloud with doors; without any, the reason is that of the likeliest candidate.
+
+        Args:
+            doors: doors, the one to answer for first.
+            refused: candidates that are no doors.
+            num_points: points that the method evaluated.
+            milliseconds: from the raw cloud to the doors.
+            tilt: tilt that was found in the cloud.
+        """
+        if doors:
+            single = cls._of_door(doors[0], num_points, milliseconds)
+        else:
+            likeliest = max(refused, key=lambda door: door.door_probability or 0.0, default=None)
+            abstention = None if likeliest is None else likeliest.abstention
+            single = cls.abstain(abstention or Abstention("no_doorway"), num_points, milliseconds)
+            single = replace(
+                single, door_probability=None if likeliest is None else likeliest.door_probability
+            )
+        return replace(single, doors=tuple(doors), refused=tuple(refused), tilt=tilt)
+
+    @classmethod
+    def _of_door(cls, door: Door, num_points: int, milliseconds: float) -> Prediction:
+        has_state = door.state is not None
+        return cls(
+            door.state,
+            num_points,
+            milliseconds,
+            door.abstention,
+            raw_probabilities=door.raw_probabilities,
+            door_probability=door.door_probability,
+            opening_angle_deg=door.opening_angle_deg,
+            hinge=door.hinge,
+            hinge_probability=door.hinge_probability,
+            frame=door.frame if has_state else None,
+            opening_width_m=door.width_m if has_state else None,
+            passable_width_m=door.passable_width_m,
         )
 
     @classmethod

@@ -10,9 +10,11 @@ from pathlib import Path
 from doorstate._memory import keep_freed_memory
 from doorstate.clouds.outliers import CleanCloud, remove_outliers
 from doorstate.clouds.preparation import CloudSpec, PreparedCloud, prepare_cloud
+from doorstate.clouds.shape import check_batch
 from doorstate.errors import ConfigError
 from doorstate.inference.abstention import Abstention
 from doorstate.inference.gate import DEFAULT_GATE, Gate
+from doorstate.inference.known import DoorKnown, Known
 from doorstate.inference.prediction import Prediction
 from doorstate.types import DoorState, Points
 
@@ -88,27 +90,58 @@ class Predictor(ABC):
     def name(self) -> str:
         """Name of the network or rule."""
 
-    @abstractmethod
-    def __call__(self, cloud: Points) -> Prediction:
+    def __call__(
+        self,
+        cloud: Points,
+        *,
+        door_known: DoorKnown = False,
+        is_level: bool = False,
+        camera_height_m: float | None = None,
+    ) -> Prediction:
         """Predict the state of the door in a cloud, or abstain with a reason.
+
+        Only weights for doorways find several doors, turn tilted clouds level, and use a rough place of a door; whole
+        clouds must be level.
 
         Args:
             cloud: (N, 3) or organized (H, W, 3) metres, x forward, y left, z up, NaN where nothing was measured.
+            door_known: True if a door is known to be in view, so that "no door" is no answer, or its rough place.
+            is_level: z of the cloud points up; False leaves the tilt to be found.
+            camera_height_m: height of the camera above the floor, if it is known.
 
         Raises:
             CloudContentError: not one cloud, or not in metres.
+            ConfigError: a rough place that this method or cloud cannot use.
         """
+        return self._predict([cloud], Known(door_known, is_level, camera_height_m))[0]
 
-    def batch(self, clouds: Sequence[Points]) -> list[Prediction]:
+    def batch(
+        self,
+        clouds: Sequence[Points],
+        *,
+        door_known: DoorKnown = False,
+        is_level: bool = False,
+        camera_height_m: float | None = None,
+    ) -> list[Prediction]:
         """Predict the states of the doors in several clouds, which may differ in form and size.
 
-        Raises:
-            CloudContentError: as for a call.
-        """
-        return [self(cloud) for cloud in clouds]
+        Returns:
+            One prediction a cloud, in their order; `milliseconds` is an equal share of the time of all.
 
-    def prepare(self, cloud: Points) -> PreparedCloud:
-        """Return the points of a cloud that are evaluated, or that represent it where all are.
+        Raises:
+            CloudContentError: as for a call, or one cloud in place of several.
+            ConfigError: as for a call.
+        """
+        return self._predict(check_batch(clouds), Known(door_known, is_level, camera_height_m))
+
+    @abstractmethod
+    def _predict(self, clouds: Sequence[Points], known: Known) -> list[Prediction]:
+        """Return the predictions of clouds for which the same is known."""
+
+    def prepare(
+        self, cloud: Points, *, is_level: bool = False, camera_height_m: float | None = None
+    ) -> PreparedCloud:
+        """Return the points of a cloud that are evaluated, or that represent it where all are; arguments as for a call.
 
         Raises:
             CloudContentError: as for a call.
@@ -133,6 +166,14 @@ class Predictor(ABC):
             if abstention is not None:
                 return prediction.refuse(abstention)
         return prediction
+
+    def _check_hint(self, known: Known) -> None:
+        if known.hint is not None:
+            raise ConfigError(
+                f"{self} sees the whole cloud and cannot use a rough place",
+                field="door_known",
+                expected="True or False",
+            )
 
     def warm_up(self) -> None:
         """Make the first call as quick as later ones; the process keeps freed memory from then on."""

@@ -4,12 +4,14 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from typing import Any
 
 from doorstate.clouds.shape import check_single_cloud
 from doorstate.errors import TooFewPointsError
 from doorstate.inference.abstention import Abstention
 from doorstate.inference.gate import DEFAULT_GATE, Gate
+from doorstate.inference.known import Known
 from doorstate.inference.prediction import Prediction
 from doorstate.inference.predictor import Predictor
 from doorstate.rules import create_rule
@@ -49,15 +51,12 @@ class RulePredictor(Predictor):
     def __str__(self) -> str:
         return f"rule {self.name}"
 
-    def __call__(self, cloud: Points) -> Prediction:
-        """Predict the state of the door in a cloud, or abstain with a reason; there are no probabilities.
+    def _predict(self, clouds: Sequence[Points], known: Known) -> list[Prediction]:
+        self._check_hint(known)
+        return [self._apply(cloud) for cloud in clouds]
 
-        Args:
-            cloud: (N, 3) or organized (H, W, 3) metres, x forward, y left, z up, NaN where nothing was measured.
-
-        Raises:
-            CloudContentError: not one cloud.
-        """
+    def _apply(self, cloud: Points) -> Prediction:
+        """Return the prediction of one cloud; there are no probabilities."""
         started = time.perf_counter()
         clean = self._clean(check_single_cloud(cloud))
         num_points = len(measured_points(clean.points))

@@ -7,6 +7,7 @@ returns nothing, so that most rays to that floor are missing, even where a pane 
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -31,6 +32,13 @@ class Opening(NamedTuple):
 
     left_m: tuple[float, float]
     right_m: tuple[float, float]
+
+    @classmethod
+    def in_frame(cls, x_m: float, y_m: float, yaw_deg: float, width_m: float) -> Opening:
+        """Return the opening of a door frame: its middle, the direction of the wall towards its left, its width."""
+        yaw = math.radians(yaw_deg)
+        along_m, across_m = (width_m / 2 * part for part in (math.cos(yaw), math.sin(yaw)))
+        return cls((x_m + along_m, y_m + across_m), (x_m - along_m, y_m - across_m))
 
     @classmethod
     def from_outline(cls, points_m: NDArray[np.float64]) -> Opening:

@@ -50,9 +50,12 @@ def wait_for(
     *,
     predictor: Callable[[Points], Prediction] | None = None,
     state_filter: StateFilter | None = None,
+    require_leaf: bool = True,
     max_gap_s: float = 0.5,
 ) -> bool:
     """Return True when a door is in a state and has been for a while, False when the time is up.
+
+    Of several doors in a cloud, it is the one most in front.
 
     Time is that of the stamps, so that a recording gives the result of the live stream. If frames may stop coming, end
     the iterator. A frame without a state never ends the waiting with True.
@@ -64,6 +67,8 @@ def wait_for(
         hold_s: time for which the filtered state must have held.
         predictor: method for clouds; None loads the packaged weights.
         state_filter: filter to use, with other parameters or earlier frames; None makes a new one.
+        require_leaf: wait on if no leaf was seen at an open door, because a pane of glass cannot be excluded. Methods
+            that do not look for one (`Prediction.leaf_seen` is None) are not concerned.
         max_gap_s: longest gap between frames with a state (`HoldTimer`).
 
     Raises:
@@ -91,7 +96,8 @@ def wait_for(
         if waited_s > timeout_s:
             return False
         held_s = timer.update(prediction, filtered, stamp_s)
-        if prediction.state == target and held_s is not None and held_s >= hold_s:
+        has_held = held_s is not None and held_s >= hold_s
+        if has_held and prediction.confirms(target, require_leaf=require_leaf):
             return True
     return False
 

@@ -5,14 +5,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from doorstate.clouds.measured import is_measured
 from doorstate.errors import CameraError, DoorstateError, summarize_exception
 from doorstate.inference.abstention import Abstention
-from doorstate.inference.door_report import DoorReport
+from doorstate.inference.door_lines import FLOOR_SHARE, door_lines
+from doorstate.inference.door_report import DoorPose, DoorReport
+from doorstate.inference.posed import predict_posed
 from doorstate.inference.prediction import Prediction
 from doorstate.inference.predictor import Predictor
 from doorstate.inference.state_filter import StateFilter
@@ -26,7 +29,7 @@ from doorstate.io.sensor_pose import PosedCloud, SensorPose
 from doorstate.rules.base import Detection
 from doorstate.types import DoorState, Points
 
-_CENTRE_POINTS = 4096  # are enough for a median
+_SAMPLE_POINTS = 4096  # are enough for a median
 
 
 class DoorWatch:
@@ -46,6 +49,7 @@ class DoorWatch:
         self._settings = settings
         self._type = MESSAGE_TYPES[settings.input]
         self._options = settings.read_options()
+        self._door_known = settings.known_door()
         self._predictor = predictor or settings.load_predictor()
         self._camera: Intrinsics | CameraError = CameraError("no CameraInfo has come yet")
         self._due_s = -math.inf
@@ -93,7 +97,8 @@ class DoorWatch:
         stamp_ns = stamp_ns_of(message) or received_ns
         stamp_s = stamp_ns / 1e9
         self._frame_id = str(message.header.frame_id)
-        centre, pose, prediction = self._predict(message)
+        seen = self._predict(message)
+        prediction = seen.prediction
         if prediction.state is not None:
             self._last_state_s = stamp_s
         elif stamp_s - self._last_state_s >= self._settings.silence_s:
@@ -107,13 +112,18 @@ class DoorWatch:
             prediction,
             filtered,
             held_s,
-            prediction.state is DoorState.OPEN and has_held,
-            pose.from_body(centre),
+            has_held and prediction.confirms(DoorState.OPEN, require_leaf=self._settings.require_leaf),
+            seen.to_message(seen.centre_m),
             tuple(
-                Detection(detection.name, pose.from_body(detection.points_m))
+                Detection(detection.name, seen.pose.from_body(detection.points_m))
                 for detection in prediction.detections
             ),
-            pose,
+            tuple(
+                line._replace(points_m=seen.to_message(line.points_m))
+                for line in door_lines(prediction, seen.floor_z_m)
+            ),
+            tuple(DoorPose.of(door, seen.floor_z_m, seen.to_message) for door in prediction.doors),
+            seen.pose,
         )
 
     def report_silence(self, now_ns: int) -> DoorReport:
@@ -127,19 +137,19 @@ class DoorWatch:
         self._filter, self._hold_timer = StateFilter(), HoldTimer()
         self._last_state_s = -math.inf
 
-    def _predict(self, message: Any) -> tuple[Points, SensorPose, Prediction]:
-        """Return the centre (3,) of the measured points and the prediction, in the body frame, and the pose."""
-        centre, pose = np.zeros(3, np.float32), DEFAULT_OPTIONS.pose()
+    def _predict(self, message: Any) -> _Seen:
+        """Return the prediction for a message, with the pose of its camera and the places of its points."""
+        sample, pose = np.empty((0, 3), np.float32), DEFAULT_OPTIONS.pose()
         try:
             points, pose = self._cloud(message)
-            centre = _centre_m(points)
-            return centre, pose, self._predictor(points)
+            sample = _sample(points)
+            return _Seen(sample, pose, predict_posed(self._predictor, points, pose, self._door_known))
         except DoorstateError as error:
             abstention = Abstention.from_error(error)
         except Exception as error:  # libraries raise anything for foreign bytes; a robot's node must go on
             sentence = f"damaged message ({summarize_exception(error)})"
             abstention = Abstention("damaged_message", message=sentence)
-        return centre, pose, Prediction.abstain(abstention)
+        return _Seen(sample, pose, Prediction.abstain(abstention))
 
     def _cloud(self, message: Any) -> PosedCloud:
         options = self._options
@@ -150,9 +160,34 @@ class DoorWatch:
         return cloud_from_message(message, self._type, options)
 
 
-def _centre_m(points: Points) -> Points:
-    """Return the (3,) median of the measured points; the camera if there are none."""
+class _Seen(NamedTuple):
+    """Prediction for one message."""
+
+    sample: Points  # (M, 3) measured points in the body frame; none without a readable message
+    pose: SensorPose
+    prediction: Prediction
+
+    def to_message(self, points: NDArray[Any]) -> NDArray[np.float64]:
+        """Return points (..., 3) of the level sensor frame in the frame of the message."""
+        tilt = self.prediction.tilt
+        return self.pose.from_body(points if tilt is None else tilt.from_level(points))
+
+    @property
+    def _level(self) -> NDArray[Any]:
+        return self.sample if self.prediction.tilt is None else self.prediction.tilt.to_level(self.sample)
+
+    @property
+    def centre_m(self) -> NDArray[Any]:
+        """(3,) median of the points in the level sensor frame; the camera without any."""
+        return np.median(self._level, axis=0) if len(self.sample) else np.zeros(3)
+
+    @property
+    def floor_z_m(self) -> float:
+        """Height of the lowest points in the level sensor frame."""
+        return float(np.quantile(self._level[:, 2], FLOOR_SHARE)) if len(self.sample) else 0.0
+
+
+def _sample(points: Points) -> Points:
     flat = points.reshape(-1, 3)
-    sample = flat[:: max(1, len(flat) // _CENTRE_POINTS)]
-    sample = sample[is_measured(sample)]
-    return np.median(sample, axis=0).astype(np.float32) if len(sample) else np.zeros(3, np.float32)
+    sample = flat[:: max(1, len(flat) // _SAMPLE_POINTS)]
+    return sample[is_measured(sample)]

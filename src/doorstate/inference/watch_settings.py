@@ -11,6 +11,7 @@ from pydantic import ConfigDict, Field, ValidationError
 from doorstate._models import FrozenModel
 from doorstate.errors import CameraError, ConfigError, unknown_name
 from doorstate.inference.gate import DEFAULT_GATE
+from doorstate.inference.known import DoorKnown, door_known
 from doorstate.inference.predictor import DEFAULT_NETWORK, Predictor
 from doorstate.io.messages import CLOUD, COMPRESSED_IMAGE, IMAGE
 from doorstate.io.options import ReadOptions
@@ -37,6 +38,20 @@ class WatchSettings(FrozenModel):
     )
     threads: int = Field(
         0, ge=0, description="Processor threads of one call to a network; 0: one a processor, at most 4."
+    )
+    door_known: bool = Field(
+        False, description="A door is known to be in view, so that no door is no answer."
+    )
+    door_pose: str = Field(
+        "",
+        description="Rough place of that door for weights of doorways and a camera that stands still: x y, x y yaw or"
+        " x y yaw width of its opening, in metres forward and left of the camera and degrees; empty: none.",
+    )
+    door_box: str = Field(
+        "", description="In place of door_pose: left top right bottom of a box around the door, in pixels."
+    )
+    require_leaf: bool = Field(
+        True, description="Report an open door without a visible leaf, which may be glass, as not free."
     )
     gate: bool = Field(True, description="Report clouds in which too much is missing as unknown.")
     axes: str = Field(
@@ -79,6 +94,14 @@ class WatchSettings(FrozenModel):
             units_m=UNITS_M[self.units],
         )
 
+    def known_door(self) -> DoorKnown:
+        """Return True, or the rough place, where a door is known to be in view.
+
+        Raises:
+            ConfigError: no place of a door.
+        """
+        return door_known(self.door_known, self.door_pose or None, self.door_box or None)
+
     def load_predictor(self) -> Predictor:
         """Load and warm up the network or rule that is named.
 
@@ -106,6 +129,7 @@ def parse_settings(parameters: Mapping[str, Any]) -> WatchSettings:
     try:
         settings = WatchSettings(**parameters)
         settings.read_options()
+        settings.known_door()
     except ValidationError as error:
         problem = error.errors()[0]
         name = str(problem["loc"][0])

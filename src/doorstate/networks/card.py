@@ -21,6 +21,14 @@ DIGEST_KEY = "digest"  # of the file, in its card (networks.digest)
 _DIGEST = re.compile("sha256:[0-9a-f]{64}")
 
 
+class HeadErrors(FrozenModel):
+    """Standard errors of the heads on validation doors."""
+
+    position_m: float = Field(gt=0)  # of the opening's middle
+    yaw_deg: float = Field(gt=0)
+    angle_deg: dict[str, float] = Field(default_factory=dict)  # by state
+
+
 class WeightsCard(FrozenModel):
     """Network, preparation of clouds, calibration and origin of a weights file."""
 
@@ -38,6 +46,7 @@ class WeightsCard(FrozenModel):
     # Logits are divided by it (training.calibration).
     temperature: float = Field(default=1.0, ge=1e-3, le=1e3)
     abstain_below: float = Field(default=0.0, ge=0, lt=1)  # abstain if no state is more probable
+    errors: HeadErrors | None = None  # on validation doors; None: not measured
     trained_on: str = ""
     doorstate_version: str = __version__
 

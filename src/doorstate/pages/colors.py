@@ -21,6 +21,8 @@ DETECTION_COLORS = {
     "door frame": "#00A651",
     "hinge": "#7B4FA3",
     "angle": "#B3202C",
+    "swing": "#D98A8F",
+    "refused": "#7C828C",
 }
 PART_COLORS = {
     Part.WALL: "#A9B1BC",

@@ -113,7 +113,7 @@ def create_app(queue: WorkQueue, access: Access | None = None) -> FastAPI:
         openapi_extra={"requestBody": _REQUEST_BODY},
     )
     async def predict(request: Request, query: Annotated[PredictQuery, Query()]) -> Response:
-        options, suffix = query.read_options(), query.suffix()
+        options, suffix, door_known = query.read_options(), query.suffix(), query.known_door()
         headers = {name: request.headers.get(name, "") for name in BODY_HEADERS}
         queue.check_space()
         limit_s, problem = queue.limits.timeout_s, "the upload was not complete"
@@ -123,7 +123,7 @@ def create_app(queue: WorkQueue, access: Access | None = None) -> FastAPI:
                 upload = await uploads.read(request)
                 problem = "there was no result"
                 upload.content = bytes(upload.content)  # one copy of a large file, not two
-                job = Job(upload.content, headers, suffix, options)
+                job = Job(upload.content, headers, suffix, options, door_known)
                 reply = await queue.run(job, upload.client)
         except TimeoutError as error:
             raise HTTPException(504, f"{problem} after {limit_s:g} s") from error

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from doorstate.inference.known import DoorKnown, door_known
 from doorstate.io.camera import pinhole_from_numbers
 from doorstate.io.formats import CLOUD_SUFFIXES, format_suffix
 from doorstate.io.options import ReadOptions, metres_per_unit, unit_name
@@ -53,6 +54,17 @@ class PredictQuery(BaseModel):
         json_schema_extra={"enum": list(UNITS_M)},
     )
     depth_scale: float = Field(0.001, description="Metres per unit of integer depth images.")
+    door_known: bool = Field(
+        False, description="A door is known to be in view, so that no door is no answer."
+    )
+    door_pose: str | None = Field(
+        None,
+        description="Rough place of that door for weights of doorways: x,y, x,y,yaw or x,y,yaw,width of its opening in"
+        " metres and degrees, as in the response.",
+    )
+    door_box: str | None = Field(
+        None, description="In place of door_pose: left,top,right,bottom of a box around the door, in pixels."
+    )
     fx: float | None = Field(None, description="Horizontal focal length of depth images in pixels.")
     fy: float | None = Field(None, description="Vertical focal length in pixels.")
     cx: float | None = Field(None, description="Horizontal image centre in pixels.")
@@ -76,6 +88,14 @@ class PredictQuery(BaseModel):
             depth_scale_m=self.depth_scale,
             units_m=metres_per_unit(self.units),
         )
+
+    def known_door(self) -> DoorKnown:
+        """Return True, or the rough place, where a door is known to be in view.
+
+        Raises:
+            ConfigError: no place of a door.
+        """
+        return door_known(self.door_known, self.door_pose, self.door_box)
 
     def suffix(self) -> str | None:
         """Return the suffix of the file from `format`, or else from `filename`; None leaves it to the body.

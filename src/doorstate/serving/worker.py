@@ -17,7 +17,9 @@ from typing import Any, NamedTuple
 from fastapi import HTTPException
 
 from doorstate.errors import CloudContentError, DoorstateError
+from doorstate.inference.known import DoorKnown
 from doorstate.inference.network_predictor import NetworkPredictor
+from doorstate.inference.posed import predict_posed
 from doorstate.inference.predictor import Predictor
 from doorstate.inference.serialization import prediction_to_dict, require_points
 from doorstate.io.options import ReadOptions
@@ -42,6 +44,7 @@ class Job(NamedTuple):
     headers: Mapping[str, str]  # those of `BODY_HEADERS`
     suffix: str | None  # format; None finds it out
     options: ReadOptions
+    door_known: DoorKnown = False
 
 
 class Reply(NamedTuple):
@@ -198,7 +201,7 @@ def predict_file(predictor: Predictor, job: Job, max_bytes: int) -> Reply:
     try:
         file = read_body(job.content, job.headers, max_bytes)
         cloud, pose = parse_posed_cloud(file.content, job.suffix or file.suffix, job.options)
-        prediction = require_points(predictor(cloud))
+        prediction = require_points(predict_posed(predictor, cloud, pose, job.door_known))
         record = prediction_to_dict(prediction, format_parameter, pose)
         is_faulty = prediction.abstention is not None and prediction.abstention.code == "invalid_outputs"
         return Reply(200, record, prediction.reason if is_faulty else "")

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,10 @@ from numpy.typing import NDArray
 from doorstate.clouds.measured import is_measured
 from doorstate.clouds.preparation import NUM_POINTS
 from doorstate.errors import DoorstateError, WriteParameter, python_parameter
+from doorstate.inference.door_lines import FLOOR_SHARE, Line, door_lines
+from doorstate.inference.known import DoorKnown
 from doorstate.inference.network_predictor import NetworkPredictor
+from doorstate.inference.posed import predict_posed
 from doorstate.inference.predictor import Predictor
 from doorstate.inference.serialization import prediction_to_dict
 from doorstate.pages.colors import STATE_COLORS
@@ -21,21 +24,30 @@ from doorstate.pages.document import fill_page
 from doorstate.pages.encoding import encode_bytes, encode_cloud, encode_detections
 from doorstate.types import STATES, Points
 from doorstate.viewer.named_clouds import NamedCloud
-from doorstate.viewer.predicted_door import Line, predicted_door
 
 Entry = dict[str, Any]
 """Cloud as the page gets it: `name` and `truth`, and either `error` or `prediction`, `cloud`, `whole`, `floor_z_m` and
 `detections`."""
 
 WHOLE_POINTS = 8000  # of the whole cloud, drawn under the points that were used
-_FLOOR_SHARE = 0.01  # of the points lie below the floor, by noise
 CHANNEL_STEPS = 32  # a channel count is stored in steps of 1/32, so that two bytes hold 0 to 2047
+
+
+class Shown(NamedTuple):
+    """Doors to ask for and to draw."""
+
+    door_known: DoorKnown = False
+    refused: bool = False  # draw candidates that are no doors, too
+
+
+SHOWN = Shown()
 
 
 def make_entry(
     predictor: Predictor,
     named: NamedCloud,
     parameter: WriteParameter = python_parameter,
+    shown: Shown = SHOWN,
 ) -> Entry:
     """Predict a cloud, and encode the prediction with the points that were used, at most 4096.
 
@@ -43,13 +55,14 @@ def make_entry(
         predictor: network or rule.
         named: cloud.
         parameter: how errors write parameters.
+        shown: known door, and candidates to draw.
     """
     entry: Entry = {"name": named.name, "truth": named.truth}
     try:
         if isinstance(named.cloud, DoorstateError):
             raise named.cloud
-        prediction = predictor(named.cloud)
-        prepared = predictor.prepare(named.cloud)
+        prediction = predict_posed(predictor, named.cloud, named.pose, shown.door_known)
+        prepared = predictor.prepare(named.cloud, is_level=prediction.tilt is None)
     except DoorstateError as error:
         return entry | {"error": error.describe(parameter, with_path=False)}
     counts = None if prediction.state is None else _channel_counts(predictor, prepared.points)
@@ -58,7 +71,9 @@ def make_entry(
         entry["channels"] = encode_bytes(steps.tobytes())
     parts = None if named.parts is None else named.parts[prepared.indices[:NUM_POINTS]]
     whole = thin_for_display(named.cloud)
-    floor_z_m = float(np.quantile(whole[:, 2], _FLOOR_SHARE))
+    if prediction.tilt is not None:
+        whole = prediction.tilt.to_level(whole)
+    floor_z_m = float(np.quantile(whole[:, 2], FLOOR_SHARE))
     return entry | {
         "prediction": prediction_to_dict(prediction, parameter, named.pose),
         "cloud": encode_cloud(prepared.points[:NUM_POINTS], parts),
@@ -66,7 +81,7 @@ def make_entry(
         "floor_z_m": round(floor_z_m, 3),
         "detections": [
             *encode_detections(prediction.detections),
-            *map(_encode_line, predicted_door(prediction, floor_z_m)),
+            *map(_encode_line, door_lines(prediction, floor_z_m, refused=shown.refused)),
         ],
     }
 
@@ -94,6 +109,8 @@ def _encode_line(line: Line) -> dict[str, Any]:
 def _channel_counts(predictor: Predictor, points: Points) -> NDArray[np.float32] | None:
     """Return (N,) channel counts of the points; None where these are not defined."""
     if not isinstance(predictor, NetworkPredictor) or (network := predictor.backend.network) is None:
+        return None
+    if predictor.card.input != "whole":  # the points are those of several crops
         return None
     from doorstate.viewer.critical_points import critical_points  # needs torch, an exported network does not
 

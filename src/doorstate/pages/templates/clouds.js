@@ -278,8 +278,9 @@ const clouds = (() => {
   }
 
   // ---- previews that can be opened -------------------------------------------------------------------------
+  const WIDTHS = { hinge: 4, swing: 1.5, refused: 1.5 };
   const detectionLines = (detections) =>
-    detections.map(({ name, points, label }) => ({ name, points, label, color: detectionColor(name), width: name === "hinge" ? 4 : 2 }));
+    detections.map(({ name, points, label }) => ({ name, points, label, color: detectionColor(name), width: WIDTHS[name] ?? 2 }));
 
   // Draw the canvases in buttons when they come into view; `input(button)` returns { cloud, colors, sizes, detections }.
   // A click replaces the button by a large view that can be turned.

@@ -118,16 +118,30 @@
     return `${turns.filter(Boolean).join(", ") || "level"} (${pose.tilt_from})`;
   }
 
+  function distance({ doors = [], door_x_m, door_y_m }) {
+    if (doors.length) return metres(doors[0].distance_m);
+    return door_x_m === undefined ? "" : metres(Math.hypot(door_x_m, door_y_m));
+  }
+
   const facts = (prediction) => [
     ["angle", degrees(prediction.opening_angle_deg)],
     ["passable", metres(prediction.passable_width_m)],
-    ["distance", prediction.door_x_m === undefined ? "" : metres(Math.hypot(prediction.door_x_m, prediction.door_y_m))],
+    ["distance", distance(prediction)],
     ["hinge", prediction.hinge],
     ["points", prediction.points.toLocaleString("en")],
     ["time", `${prediction.milliseconds.toFixed(0)} ms`],
     ["axes", axes(prediction.sensor_pose), "wide"],
-    ["camera", tilt(prediction.sensor_pose), "wide"],
+    ["camera", tilt(prediction.tilt ?? prediction.sensor_pose), "wide"],
+    ...others(prediction),
   ];
+
+  // Doors besides the one that the prediction is about, by their numbers in the picture.
+  const others = ({ doors = [] }) => doors.slice(1).map((door, k) => [
+    `door ${k + 2}`,
+    [door.state ? stateName(door.state) : door.reason, metres(door.distance_m), side(door.bearing_deg)].join(", "),
+    "wide",
+  ]);
+  const side = (bearing) => (Math.round(bearing) ? `${degrees(Math.abs(bearing))} ${bearing > 0 ? "left" : "right"}` : "ahead");
 
   function describe(entry) {
     const { prediction } = entry;

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Doors as lines over a cloud: frame, leaf at its angle, swing and hinge; refused candidates as frames."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from doorstate.inference.door import Door
+from doorstate.inference.prediction import Prediction
+
+DOOR_HEIGHT_M = 2.0  # of the drawing; no head predicts it
+FLOOR_SHARE = 0.01  # of the points lie below the floor, by noise
+_REFUSED_HEIGHT_M = 1.0  # lower than doors, so that both can be told apart where they overlap
+_SWING_DEG = 90.0  # a leaf is drawn with the way that it takes to be open
+_STEPS = 16
+_ANGLE_SHARE = 0.55  # radius of the arc of the angle, of the width of the leaf
+
+Place = NDArray[np.float64]
+
+
+class Line(NamedTuple):
+    """Line over a cloud."""
+
+    name: str
+    points_m: NDArray[np.float64]  # (K, 3) level sensor frame
+    label: str = ""  # at its end
+
+
+def door_lines(prediction: Prediction, floor_z_m: float, *, refused: bool = False) -> list[Line]:
+    """Return the lines of all doors of a prediction; labels number them where there are several.
+
+    Args:
+        prediction: a prediction; without doors there is nothing to draw.
+        floor_z_m: height of the floor in the level sensor frame, for doors without their own.
+        refused: draw candidates that are no doors as well, with their reasons.
+    """
+    several = len(prediction.doors) > 1
+    lines = []
+    for number, door in enumerate(prediction.doors, 1):
+        label = f"{number}: {door.label.replace('_', '-')}" if several else ""
+        lines += _lines(door, floor_z_m, label)
+    for door in prediction.refused if refused else ():
+        lines.append(Line("refused", _frame(door, floor_z_m, _REFUSED_HEIGHT_M), _short_reason(door)))
+    return lines
+
+
+def _lines(door: Door, floor_z_m: float, label: str) -> list[Line]:
+    """Return the lines of one door, those that follow from its values.
+
+    The leaf is drawn on the robot's side of the wall, because no head predicts to which side it swings.
+    """
+    frame = Line("door frame", _frame(door, floor_z_m, DOOR_HEIGHT_M), label)
+    if door.hinge is None:
+        return [frame]
+    left, right = (np.array(end) for end in door.opening)
+    along = (left - right) / door.width_m  # along the wall, to its left
+    hinge, shut = (left, -along) if door.hinge == "left" else (right, along)
+    floor_m = _floor_m(door, floor_z_m)
+    axis = Line("hinge", _upright(hinge, hinge, floor_m, DOOR_HEIGHT_M)[:2])
+    if door.opening_angle_deg is None:
+        return [frame, axis]
+
+    def arc(radius_m: float, angle_deg: float) -> Place:
+        """Return the (K, 3) places of an arc on the floor, from the shut leaf on."""
+        angles = np.radians(np.linspace(0.0, angle_deg, _STEPS))
+        towards_robot = np.array([-along[1], along[0]])
+        directions = np.outer(np.cos(angles), shut) + np.outer(np.sin(angles), towards_robot)
+        return np.column_stack([hinge + radius_m * directions, np.full(_STEPS, floor_m)])
+
+    tip = arc(door.width_m, door.opening_angle_deg)[-1, :2]
+    leaf = _upright(hinge, tip, floor_m, DOOR_HEIGHT_M)
+    angle = f"{door.opening_angle_deg:.0f}°"
+    return [
+        frame,
+        Line("leaf", np.concatenate([leaf, leaf[:1]])),
+        Line("angle", arc(_ANGLE_SHARE * door.width_m, door.opening_angle_deg), angle),
+        Line("swing", arc(door.width_m, max(_SWING_DEG, door.opening_angle_deg))),
+        axis,
+    ]
+
+
+def _frame(door: Door, floor_z_m: float, height_m: float) -> Place:
+    """Return the (5, 3) corners of a door frame, from the upper right one around."""
+    left, right = (np.array(end) for end in door.opening)
+    corners = _upright(left, right, _floor_m(door, floor_z_m), height_m)
+    return corners[[2, 3, 0, 1, 2]]
+
+
+def _floor_m(door: Door, floor_z_m: float) -> float:
+    return floor_z_m if door.floor_z_m is None else door.floor_z_m
+
+
+def _short_reason(door: Door) -> str:
+    """Return the code of the reason in words, and the probability of a door where the network was asked."""
+    words = "" if door.abstention is None else door.abstention.code.replace("_", " ")
+    return words if door.door_probability is None else f"{words} ({door.door_probability:.2f})"
+
+
+def _upright(start: Place, end: Place, floor_m: float, height_m: float) -> Place:
+    """Return the (4, 3) corners of an upright rectangle, from the foot of start up, over and down to end."""
+    heights = (floor_m, floor_m + height_m, floor_m + height_m, floor_m)
+    return np.array([[*place, z] for place, z in zip((start, start, end, end), heights, strict=True)])

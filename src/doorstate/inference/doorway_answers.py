@@ -1,0 +1,204 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Doors from the outputs of a network for the crops of one cloud: placed, merged where they overlap, and decided.
+
+The network corrects place, direction and width of each candidate in the doorway's frame. Candidates whose corrected
+openings overlap on nearly the same wall are one door, and their outputs are averaged by the probability of a door.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from doorstate.doorways.doorway import Doorway
+from doorstate.inference.abstention import Abstention
+from doorstate.inference.backends.base import CloudOutputs
+from doorstate.inference.decode import abstention_of, leaf_fields
+from doorstate.inference.door import Door, DoorFrame
+from doorstate.inference.pose_errors import (
+    FINDER_ERRORS,
+    FINDER_POSITION_M,
+    Correction,
+    Scatter,
+    door_errors,
+)
+from doorstate.networks.card import WeightsCard
+from doorstate.types import DECISION_THRESHOLD, DOOR, STATES, DoorState
+
+Floats = NDArray[np.float64]
+
+# Chosen: as wide as the finder's usual errors of two candidates of one door; walls of a recess are farther apart.
+_SAME_WALL_M, _SAME_WALL_DEG = 0.3, 20.0
+_MIN_OVERLAP = 0.5  # of the narrower opening; neighbouring doors share no more than a jamb
+
+
+class Answer(NamedTuple):
+    """Outputs of a network for the crop of a candidate."""
+
+    doorway: Doorway
+    outputs: CloudOutputs  # in the doorway's frame
+    is_asked: bool = False  # at the place of a door that is known to be there
+
+    @property
+    def door_probability(self) -> float:
+        """Probability of a door; 1 without the head for it."""
+        return self.outputs.heads.get("p_door", 1.0)
+
+    @property
+    def correction(self) -> Correction:
+        """Correction of place and direction in the doorway's frame; zero without the head for it."""
+        names = ("door_x_m", "door_y_m", "door_yaw_deg")
+        return Correction(*(self.outputs.heads.get(name, 0.0) for name in names))
+
+    @property
+    def frame(self) -> DoorFrame:
+        """Corrected pose in the level sensor frame."""
+        along_m, across_m, yaw_deg = self.correction
+        x_m, y_m, _ = self.doorway.to_sensor(np.array([along_m, across_m, 0.0], np.float32)).tolist()
+        return DoorFrame(x_m, y_m, _turned(self.doorway.yaw_deg + yaw_deg))
+
+    @property
+    def width_m(self) -> float:
+        """Width of the opening, by the network where it has the head for it."""
+        return self.outputs.heads.get("opening_width_m", self.doorway.width_m)
+
+
+class DecidedDoors(NamedTuple):
+    """Doors in a cloud, and the candidates that are none."""
+
+    doors: tuple[Door, ...]  # the likeliest first
+    refused: tuple[Door, ...]
+    known: Door | None  # of the doors, the one that is known to be there
+
+
+def decide_doors(answers: Sequence[Answer], card: WeightsCard) -> DecidedDoors:
+    """Return a door for each group of overlapping candidates.
+
+    The likeliest group at the place of a known door is a door, however improbable. Without the head `door` every
+    candidate would be one, so that only the finder's best is answered for.
+
+    Args:
+        answers: outputs by candidate.
+        card: card of the weights.
+    """
+    if DOOR not in card.heads:
+        answers = sorted(answers, key=lambda answer: (not answer.is_asked, -answer.doorway.score))[:1]
+    groups = _group(answers)
+    known = next((group for group in groups if any(answer.is_asked for answer in group)), None)
+    decided = [(_decide(group, card, group is known), group is known) for group in groups]
+    return DecidedDoors(
+        tuple(door for door, _ in decided if not _is_no_door(door)),
+        tuple(door for door, _ in decided if _is_no_door(door)),
+        next((door for door, is_known in decided if is_known), None),
+    )
+
+
+def _is_no_door(door: Door) -> bool:
+    return door.abstention is not None and door.abstention.code == "no_door"
+
+
+def refused_candidate(doorway: Doorway, abstention: Abstention) -> Door:
+    """Return a candidate that no network was asked about."""
+    return Door(
+        doorway.x_m,
+        doorway.y_m,
+        doorway.yaw_deg,
+        doorway.width_m,
+        None,
+        abstention,
+        position_error_m=FINDER_POSITION_M,
+        yaw_error_deg=FINDER_ERRORS.yaw_deg,
+        floor_z_m=doorway.floor_z_m,
+        score=doorway.score,
+    )
+
+
+def _group(answers: Sequence[Answer]) -> list[list[Answer]]:
+    """Return the answers by door; the likeliest of each is the first."""
+    groups: list[list[Answer]] = []
+    for answer in sorted(answers, key=lambda answer: (-answer.door_probability, -answer.doorway.score)):
+        for group in groups:
+            if _overlap(group[0], answer):
+                group.append(answer)
+                break
+        else:
+            groups.append([answer])
+    return groups
+
+
+def _overlap(first: Answer, second: Answer) -> bool:
+    """Return True if two openings overlap in plan view and lie on nearly the same wall."""
+    (x_m, y_m, yaw_deg), other = first.frame, second.frame
+    if abs(_turned(other.yaw_deg - yaw_deg)) > _SAME_WALL_DEG:
+        return False
+    cos, sin = math.cos(math.radians(yaw_deg)), math.sin(math.radians(yaw_deg))
+    along_m = (other.x_m - x_m) * cos + (other.y_m - y_m) * sin
+    across_m = (other.y_m - y_m) * cos - (other.x_m - x_m) * sin
+    half_m, other_half_m = first.width_m / 2, second.width_m / 2
+    shared_m = min(half_m, along_m + other_half_m) - max(-half_m, along_m - other_half_m)
+    return abs(across_m) <= _SAME_WALL_M and shared_m >= 2 * _MIN_OVERLAP * min(half_m, other_half_m)
+
+
+def _decide(group: Sequence[Answer], card: WeightsCard, door_known: bool) -> Door:
+    """Return the door of overlapping candidates, with a state or the reason why there is none."""
+    members = [answer for answer in group if answer.door_probability >= DECISION_THRESHOLD] or group[:1]
+    leader = members[0]
+    weights = np.array([answer.door_probability for answer in members])
+    shares: Floats = weights / weights.sum() if weights.sum() > 0 else np.ones(1)
+    yaw_deg = leader.frame.yaw_deg
+    frames = np.array(
+        [(x_m, y_m, _turned(yaw - yaw_deg)) for x_m, y_m, yaw in (answer.frame for answer in members)]
+    )
+    x_m, y_m, turn_deg = (shares @ frames).tolist()
+    outputs = _mean_outputs(members, shares)
+    abstention = abstention_of(outputs, card.abstain_below, door_known=door_known)
+    state = DoorState.from_index(int(outputs.probabilities.argmax()))
+    door = Door(
+        x_m,
+        y_m,
+        _turned(yaw_deg + turn_deg),
+        float(shares @ [answer.width_m for answer in members]),
+        state,
+        raw_probabilities=dict(zip(STATES, outputs.probabilities.tolist(), strict=True)),
+        door_probability=outputs.heads.get("p_door"),
+        **leaf_fields(outputs.heads),
+        **door_errors(card, leader.correction, _scatter(members, frames, shares), state)._asdict(),
+        floor_z_m=leader.doorway.floor_z_m,
+        score=max(answer.doorway.score for answer in members),
+    )
+    return door if abstention is None else door.refuse(abstention)
+
+
+def _scatter(members: Sequence[Answer], frames: Floats, shares: Floats) -> Scatter:
+    """Return the standard deviations of the answers (K) with frames (K, 3), weighted by shares (K,)."""
+    angles_deg = np.array([answer.outputs.heads.get("opening_angle_deg", 0.0) for answer in members])
+    values = np.column_stack([frames, angles_deg])
+    x, y, yaw, angle = (shares @ (values - shares @ values) ** 2).tolist()
+    return Scatter(math.sqrt(x + y), math.sqrt(yaw), math.sqrt(angle))
+
+
+def _mean_outputs(members: Sequence[Answer], shares: Floats) -> CloudOutputs:
+    """Return the weighted mean of the outputs, with the largest probability of a door.
+
+    Exported networks withhold heads of crops that they refuse; the others give the mean.
+    """
+    probabilities = (shares @ [answer.outputs.probabilities for answer in members]).astype(np.float32)
+    heads = {}
+    for name in {name: None for answer in members for name in answer.outputs.heads}:
+        given = np.array([answer.outputs.heads.get(name, math.nan) for answer in members])
+        is_given = ~np.isnan(given)
+        heads[name] = float(shares[is_given] @ given[is_given] / shares[is_given].sum())
+    if "p_door" in heads:
+        heads["p_door"] = members[0].door_probability
+    if "passable_width_m" in heads:
+        heads["passable_width_m"] = min(heads["passable_width_m"], heads["opening_width_m"])
+    return CloudOutputs(probabilities, heads)
+
+
+def _turned(angle_deg: float) -> float:
+    """Return an angle from -180 to 180 degrees."""
+    return (angle_deg + 180) % 360 - 180

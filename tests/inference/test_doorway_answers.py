@@ -1,0 +1,220 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Corrections are carried to the sensor frame, overlapping candidates merged, and errors grow with disagreement."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from doorstate.doorways.doorway import Doorway
+from doorstate.inference.doorway_answers import Answer, DecidedDoors, decide_doors
+from doorstate.inference.pose_errors import FINDER_ERRORS, FINDER_POSITION_M
+from doorstate.types import DoorState
+from tests.inference.scripted_doorways import CARD, FLOOR_M, MEASURED, doorway, outputs
+
+_ANGLE = st.floats(-179, 179)
+_STEP = st.floats(-0.3, 0.3)
+
+
+def decided(*answers: Answer) -> DecidedDoors:
+    return decide_doors(answers, CARD)
+
+
+@given(
+    x_m=st.floats(1, 5),
+    y_m=st.floats(-2, 2),
+    yaw_deg=_ANGLE,
+    along_m=_STEP,
+    across_m=_STEP,
+    turn_deg=st.floats(-20, 20),
+)
+def test_corrections_of_the_crop_are_carried_to_the_sensor_frame(
+    x_m: float, y_m: float, yaw_deg: float, along_m: float, across_m: float, turn_deg: float
+) -> None:
+    """The corrected frame holds a point of the true door's frame at the same place as the crop does."""
+    candidate = Doorway(x_m, y_m, yaw_deg, 0.9, FLOOR_M)
+    (door,) = decided(
+        Answer(candidate, outputs(door_x_m=along_m, door_y_m=across_m, door_yaw_deg=turn_deg))
+    ).doors
+    turn = math.radians(turn_deg)
+    # A point half a metre along the true wall and 20 cm before it, in the frame of the crop.
+    in_crop = np.array(
+        [
+            along_m + 0.5 * math.cos(turn) - 0.2 * math.sin(turn),
+            across_m + 0.5 * math.sin(turn) + 0.2 * math.cos(turn),
+            1.0,
+        ],
+        np.float32,
+    )
+    true = Doorway(door.x_m, door.y_m, door.yaw_deg, door.width_m, FLOOR_M)
+    np.testing.assert_allclose(
+        candidate.to_sensor(in_crop), true.to_sensor(np.array([0.5, 0.2, 1.0], np.float32)), atol=2e-5
+    )
+    assert -180 <= door.yaw_deg < 180
+
+
+def test_a_correction_moves_the_door_of_a_wall_straight_ahead() -> None:
+    """Along the wall is to the left, towards the robot is back."""
+    (door,) = decided(
+        Answer(
+            doorway(3.0), outputs("open", door_x_m=0.1, door_y_m=0.2, door_yaw_deg=-5.0, opening_width_m=0.8)
+        )
+    ).doors
+    assert (door.x_m, door.y_m, door.yaw_deg) == pytest.approx((2.8, 0.1, 85.0), abs=1e-5)
+    assert (door.width_m, door.passable_width_m) == pytest.approx((0.8, 0.8))
+    assert (door.state, door.hinge, door.floor_z_m) == (DoorState.OPEN, "left", FLOOR_M)
+    assert door.hinge_probability == pytest.approx(0.8)
+    assert door.distance_m == pytest.approx(math.hypot(2.8, 0.1))
+    assert door.opening_angle_deg == pytest.approx(90.0)
+
+
+def test_no_passage_is_wider_than_its_opening() -> None:
+    (door,) = decided(Answer(doorway(), outputs("open", opening_width_m=0.7, passable_width_m=0.9))).doors
+    assert door.passable_width_m == pytest.approx(0.7)
+
+
+def test_overlapping_candidates_are_one_door() -> None:
+    """Two candidates 20 cm apart, each corrected towards the other."""
+    left, right = doorway(3.0), replace(doorway(3.0), y_m=-0.2)
+    answers = [
+        Answer(left, outputs("open", 0.9, door_x_m=-0.12, opening_angle_deg=80.0)),
+        Answer(right, outputs("open", 0.6, door_x_m=0.02, opening_angle_deg=95.0)),
+    ]
+    (door,) = decided(*answers).doors
+    assert door.y_m == pytest.approx((0.9 * -0.12 + 0.6 * -0.18) / 1.5, abs=1e-5)
+    assert door.opening_angle_deg == pytest.approx((0.9 * 80 + 0.6 * 95) / 1.5)
+    assert door.door_probability == pytest.approx(0.9)
+    assert sum((door.probabilities or {}).values()) == pytest.approx(1.0)
+    assert decided(*reversed(answers)).doors == (door,)
+
+
+def test_an_improbable_candidate_adds_nothing_to_the_door_that_it_overlaps() -> None:
+    answers = [
+        Answer(doorway(3.0), outputs("open", 0.9)),
+        Answer(replace(doorway(3.0), y_m=0.3), outputs("closed", 0.3)),
+    ]
+    alone, both = decided(answers[0]), decided(*answers)
+    assert both == alone
+    assert both.refused == ()
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        replace(doorway(3.0), y_m=1.0),  # the neighbour behind a jamb
+        replace(doorway(3.0), x_m=3.5),  # in a recess
+        replace(doorway(3.0), yaw_deg=60.0),  # on another wall
+    ],
+)
+def test_doors_beside_behind_and_across_stay_apart(other: Doorway) -> None:
+    assert len(decided(Answer(doorway(3.0), outputs()), Answer(other, outputs())).doors) == 2
+
+
+def test_half_of_a_double_door_is_the_same_door() -> None:
+    whole, half = doorway(3.0, width_m=1.8), replace(doorway(3.0), y_m=0.45)
+    answers = [
+        Answer(whole, outputs(opening_width_m=1.8)),
+        Answer(half, outputs(p_door=0.4)),
+    ]
+    (door,) = decided(*answers).doors
+    assert (door.width_m, door.y_m) == pytest.approx((1.8, 0.0), abs=1e-5)
+
+
+@given(yaw_deg=_ANGLE, turn_deg=st.floats(-15, 15))
+def test_directions_are_averaged_over_a_full_turn(yaw_deg: float, turn_deg: float) -> None:
+    first = Doorway(3.0, 0.0, yaw_deg, 0.9, FLOOR_M)
+    second = replace(first, yaw_deg=yaw_deg + turn_deg)
+    (door,) = decided(Answer(first, outputs()), Answer(second, outputs())).doors
+    assert math.cos(math.radians(door.yaw_deg - yaw_deg - turn_deg / 2)) == pytest.approx(1.0, abs=1e-6)
+
+
+def test_improbable_and_unsure_candidates_give_reasons() -> None:
+    found = decide_doors(
+        [
+            Answer(doorway(3.0), outputs("open", 0.8, p_state=0.5)),
+            Answer(doorway(3.0, 50.0), outputs("open", 0.2)),
+        ],
+        CARD.model_copy(update={"abstain_below": 0.6}),
+    )
+    (unsure,), (no_door,) = found.doors, found.refused
+    assert unsure.abstention is not None
+    assert (unsure.state, unsure.abstention.code, unsure.door_probability) == (
+        None,
+        "unsure",
+        pytest.approx(0.8),
+    )
+    assert no_door.abstention is not None
+    assert no_door.abstention.code == "no_door"
+    assert no_door.frame.x_m == pytest.approx(3.0 * math.cos(math.radians(50)), abs=1e-5)
+    assert found.known is None
+
+
+def test_a_known_door_is_the_likeliest_at_its_place() -> None:
+    answers = [
+        Answer(doorway(3.0), outputs("open", 0.3), is_asked=True),
+        Answer(doorway(3.0, 30.0), outputs("closed", 0.4), is_asked=True),
+        Answer(doorway(3.0, -40.0), outputs("closed", 0.2)),
+    ]
+    found = decided(*answers)
+    assert [door.state for door in found.doors] == [DoorState.CLOSED]
+    assert found.known is found.doors[0]
+    assert len(found.refused) == 2
+    assert found.known.door_probability == pytest.approx(0.4)
+
+
+def test_without_the_head_for_a_door_the_finders_best_is_the_door() -> None:
+    headless = CARD.model_copy(update={"heads": ("angle", "hinge", "frame", "widths")})
+    heads = dict(outputs().heads)
+    del heads["p_door"]
+    plain = outputs()._replace(heads=heads)
+    answers = [Answer(doorway(3.0, 30.0, score=0.4), plain), Answer(doorway(3.0, score=0.6), plain)]
+    found = decide_doors(answers, headless)
+    assert [door.score for door in found.doors] == [0.6]
+    assert found.doors[0].door_probability is None
+
+
+def test_without_heads_for_it_place_and_width_are_the_finders() -> None:
+    plain = outputs()._replace(heads={"p_door": 0.9})
+    (door,) = decide_doors([Answer(doorway(3.0, 10.0, 1.1), plain)], CARD).doors
+    assert (door.distance_m, door.width_m) == pytest.approx((3.0, 1.1))
+    assert (door.opening_angle_deg, door.hinge, door.passable_width_m) == (None, None, None)
+    assert (door.position_error_m, door.yaw_error_deg) == (FINDER_POSITION_M, FINDER_ERRORS.yaw_deg)
+    assert door.angle_error_deg is None
+
+
+def test_heads_that_an_exported_network_withholds_are_those_of_the_others() -> None:
+    withheld = outputs("open", 0.9)._replace(heads={"p_door": 0.9})
+    given = Answer(replace(doorway(3.0), y_m=0.1), outputs("open", 0.6))
+    (door,) = decided(Answer(doorway(3.0), withheld), given).doors
+    assert (door.opening_angle_deg, door.passable_width_m) == pytest.approx((90.0, 0.8))
+    assert door.door_probability == pytest.approx(0.9)
+    (alone,) = decided(Answer(doorway(3.0), withheld)).doors
+    assert (alone.state, alone.opening_angle_deg) == (DoorState.OPEN, None)
+
+
+def test_errors_are_those_of_the_validation_and_grow_with_disagreement() -> None:
+    def door(*answers: Answer) -> tuple[float, float, float]:
+        (found,) = decide_doors(answers, MEASURED).doors
+        assert found.position_error_m is not None
+        assert found.yaw_error_deg is not None
+        assert found.angle_error_deg is not None
+        return found.position_error_m, found.yaw_error_deg, found.angle_error_deg
+
+    semi_open = outputs("semi_open")
+    assert door(Answer(doorway(), semi_open)) == pytest.approx((0.04, 1.0, 6.0))
+    usual = outputs("semi_open", door_x_m=0.08, door_y_m=-0.05, door_yaw_deg=3.0)
+    assert door(Answer(doorway(), usual)) == pytest.approx((0.04, 1.0, 6.0))
+    large = outputs("semi_open", door_x_m=0.24, door_y_m=-0.15, door_yaw_deg=9.0)
+    assert door(Answer(doorway(), large)) == pytest.approx((0.12, 3.0, 6.0))
+    apart = [
+        Answer(doorway(), outputs("semi_open", opening_angle_deg=30.0, door_yaw_deg=2.0)),
+        Answer(replace(doorway(), y_m=0.06), outputs("semi_open", opening_angle_deg=50.0, door_yaw_deg=-2.0)),
+    ]
+    assert door(*apart) == pytest.approx(
+        (math.hypot(0.04, 0.03), math.hypot(1, 2), math.hypot(6, 10)), rel=1e-3
+    )
