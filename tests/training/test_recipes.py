@@ -37,7 +37,7 @@ def test_recipe_is_the_same_after_json(recipe: Recipe) -> None:
 def test_unknown_recipe_is_refused(name: str) -> None:
     with pytest.raises(ConfigError) as caught:
         find_recipe(name, "pointnet")
-    assert (caught.value.field, caught.value.expected) == ("recipe", "common or authors")
+    assert (caught.value.field, caught.value.expected) == ("recipe", "common or doorways or authors")
 
 
 def test_coarse_stages_must_leave_epochs_for_all_points() -> None:
