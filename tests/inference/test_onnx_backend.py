@@ -155,7 +155,9 @@ def test_export_rejects_options_that_do_not_fit(run: Run, weights: Path) -> None
 def test_the_documented_python_runs_without_torch(
     exported: Path, simulated_folder: Path, tmp_path: Path
 ) -> None:
-    example, of_doorways = re.findall(r"```python\n(.*?)```", DOCS.read_text(encoding="utf-8"), flags=re.DOTALL)
+    example, of_doorways = re.findall(
+        r"```python\n(.*?)```", DOCS.read_text(encoding="utf-8"), flags=re.DOTALL
+    )
     shutil.copy(exported, tmp_path / "pointnet2.onnx")
     shutil.copy(sorted((simulated_folder / "pcd" / "open").glob("*.pcd"))[0], tmp_path / "cloud.pcd")
     assert run_without_torch(of_doorways, tmp_path).returncode == 0
