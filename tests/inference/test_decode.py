@@ -8,7 +8,7 @@ import json
 import numpy as np
 import pytest
 
-from doorstate.inference.abstention import AbstentionCode
+from doorstate.inference.abstention import Abstention, AbstentionCode
 from doorstate.inference.backends import CloudOutputs
 from doorstate.inference.decode import decode
 from doorstate.inference.prediction import DoorFrame, Prediction
@@ -71,3 +71,22 @@ def test_a_refused_state_has_neither(prediction: Prediction, code: AbstentionCod
         "reason",
         "door_probability",
     }
+
+
+def test_the_door_of_a_whole_cloud_is_listed_where_its_frame_and_width_are_known() -> None:
+    prediction = decoded()
+    (door,) = prediction.doors
+    assert (door.frame, door.width_m, door.state) == (prediction.frame, 0.9, prediction.state)
+    assert (door.hinge, door.passable_width_m) == (prediction.hinge, 0.7)
+    assert (door.position_error_m, door.leaf_seen) == (None, None)
+    assert decoded(opening_width_m=0.0).doors == decoded(p_door=0.4).doors == ()
+    refused = prediction.refuse(Abstention("opening_not_seen", {"share": 0.5, "min_share": 0.95}))
+    assert (refused.doors, refused.frame) == ((), None)
+
+
+def test_a_known_door_is_not_asked_whether_it_is_there() -> None:
+    outputs = CloudOutputs(np.array([0.1, 0.1, 0.8], np.float32), HEADS | {"p_door": 0.1})
+    assert decode(outputs, 0.0, 1024, 5.0).state is None
+    known = decode(outputs, 0.0, 1024, 5.0, door_known=True)
+    assert (known.state, known.door_probability) == ("open", 0.1)
+    assert decode(outputs, 0.9, 1024, 5.0, door_known=True).state is None  # unsure

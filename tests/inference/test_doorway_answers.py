@@ -78,6 +78,11 @@ def test_no_passage_is_wider_than_its_opening() -> None:
     assert door.passable_width_m == pytest.approx(0.7)
 
 
+def test_an_impossible_width_is_the_finders() -> None:
+    (door,) = decided(Answer(doorway(width_m=1.0), outputs(opening_width_m=0.0))).doors
+    assert (door.width_m, door.passable_width_m) == pytest.approx((1.0, 0.1))
+
+
 def test_overlapping_candidates_are_one_door() -> None:
     """Two candidates 20 cm apart, each corrected towards the other."""
     left, right = doorway(3.0), replace(doorway(3.0), y_m=-0.2)

@@ -98,7 +98,7 @@ def _frame_fields(heads: Mapping[str, float]) -> dict[str, Any]:
 
 def _doors(prediction: Prediction) -> tuple[Door, ...]:
     """Return the door of a whole cloud, where its frame is known."""
-    if prediction.frame is None or prediction.opening_width_m is None:
+    if prediction.frame is None or not prediction.opening_width_m:
         return ()
     door = Door(
         *prediction.frame,

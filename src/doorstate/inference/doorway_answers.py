@@ -33,6 +33,7 @@ Floats = NDArray[np.float64]
 
 # Chosen: as wide as the finder's usual errors of two candidates of one door; walls of a recess are farther apart.
 _SAME_WALL_M, _SAME_WALL_DEG = 0.3, 20.0
+_MIN_WIDTH_M = 0.4  # of a door; a network that is unsure of all may give zero
 _MIN_OVERLAP = 0.5  # of the narrower opening; neighbouring doors share no more than a jamb
 
 
@@ -63,8 +64,9 @@ class Answer(NamedTuple):
 
     @property
     def width_m(self) -> float:
-        """Width of the opening, by the network where it has the head for it."""
-        return self.outputs.heads.get("opening_width_m", self.doorway.width_m)
+        """Width of the opening, by the network where it gives one that a door can have."""
+        width_m = self.outputs.heads.get("opening_width_m", 0.0)
+        return width_m if width_m >= _MIN_WIDTH_M else self.doorway.width_m
 
 
 class DecidedDoors(NamedTuple):
@@ -195,7 +197,8 @@ def _mean_outputs(members: Sequence[Answer], shares: Floats) -> CloudOutputs:
     if "p_door" in heads:
         heads["p_door"] = members[0].door_probability
     if "passable_width_m" in heads:
-        heads["passable_width_m"] = min(heads["passable_width_m"], heads["opening_width_m"])
+        width_m = float(shares @ [answer.width_m for answer in members])
+        heads["passable_width_m"] = min(heads["passable_width_m"], width_m)
     return CloudOutputs(probabilities, heads)
 
 
