@@ -50,7 +50,7 @@ nitpick_ignore_regex = [
     ("py:.*", r"doorstate\.(simulation|dataset|training|evaluation|rules\.walls)\..*"),
     (
         "py:.*",
-        r"(doorstate\.rules\.base\.)?P|Points|Indices|Floats|Columns|Tensor|NDArray|Path|NoneType",
+        r"(doorstate\.rules\.base\.)?P|Points|Indices|Floats|Columns|Quaternion|Crops|LevelingSource|Tensor|NDArray|Path|NoneType",
     ),  # type variables, and bare names in NamedTuples
     # Constraints of pydantic, and their limits.
     (
