@@ -24,6 +24,8 @@ PICTURES: Mapping[str, Callable[[], bytes]] = {
     "varied": partial(scenes.draw, "varied"),
     "cluttered": partial(scenes.draw, "cluttered"),
     "no-door": partial(scenes.draw, "no-door"),
+    "corridor": partial(scenes.draw, "corridor"),
+    "two-doors": partial(scenes.draw, "two-doors"),
     "sensors": sensors.draw,
     "view": view.draw,
     "results-by-pose-errors": partial(reports.draw, "by-pose", "errors_in_plan", errors_figure),

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Callable, Mapping
 from io import BytesIO
 
 import numpy as np
@@ -15,9 +16,18 @@ from doorstate.simulation.presets import PRESETS
 from doorstate.simulation.render import is_made_of, render
 from doorstate.simulation.row import Row
 from doorstate.simulation.shading import shade
+from doorstate.simulation.truth import true_doors
 from doorstate.types import STATES
 
-KINDS = {"varied": "door_kind", "cluttered": "occluded_bin", "no-door": "scene_kind"}
+WALLS = {"main": "in one wall", "opposite": "in walls that face each other"}
+KINDS: Mapping[str, Callable[[Row], str]] = {
+    "varied": lambda row: row.door_kind.replace("_", " "),
+    "cluttered": lambda row: f"{row.occluded_bin} % of the door hidden",
+    "no-door": lambda row: row.scene_kind.replace("_", " "),
+    "corridor": lambda row: f"{len(true_doors(row))} doors",
+    "two-doors": lambda row: WALLS.get((row.scene.other_doors or ())[0].wall, "in walls that meet"),
+}
+"""Headings of the lines, by preset, from a row."""
 SCENES = 100  # enough for every kind
 COLUMNS = 6
 WIDTH, HEIGHT, GAP, HEADING = 213, 160, 5, 26
@@ -39,7 +49,7 @@ def lines(preset: str) -> dict[str, list[Image.Image]]:
     lines_by_kind: defaultdict[str, list[Image.Image]] = defaultdict(list)
     for index in range(SCENES):
         rows, frames = simulate_rows(PRESETS[preset], 0, index)
-        line = lines_by_kind[getattr(rows[0], KINDS[preset])]
+        line = lines_by_kind[KINDS[preset](rows[0])]
         if len(line) < COLUMNS:
             line += [picture(row, frame) for row, frame in zip(rows, frames, strict=True)]
     return dict(sorted(lines_by_kind.items()))
@@ -60,8 +70,7 @@ def draw(preset: str) -> bytes:
             pen.text((left[column] + WIDTH / 2, HEADING / 2), state, "black", anchor="mm")
     for number, (kind, line) in enumerate(rows.items()):
         top = first + number * step
-        words = f"{kind} % of the door hidden" if preset == "cluttered" else kind.replace("_", " ")
-        pen.text((0, top + HEADING / 2), words, "black", anchor="lm")
+        pen.text((0, top + HEADING / 2), kind, "black", anchor="lm")
         for tile, x in zip(line, left, strict=False):
             sheet.paste(tile, (x, top + HEADING))
     png = BytesIO()
