@@ -34,6 +34,7 @@ PAGES = (
     "README.md",
     "docs/tutorial.md",
     "docs/inputs.md",
+    "docs/tilt.md",
     "docs/deployment.md",
     "docs/doors.md",
     "docs/onnx.md",

@@ -116,6 +116,18 @@ def sensors(
 
 
 @app.command()
+def leveling(out: Out = Path("docs/benchmarks"), count: Count = 100) -> None:
+    """Compare tilt and floor that clouds show with the true ones, for cameras level, tilted and on their side."""
+    from doorstate.cli.progress import progress_bar
+
+    from .leveling import leveling_table, measure_leveling, measure_time
+
+    with progress_bar("leveling") as progress:
+        tables = leveling_table(measure_leveling(count, progress)), measure_time()
+    _write(tables, out / "leveling.md", count=count)
+
+
+@app.command()
 def export(
     out: Out = Path("docs/benchmarks"),
     runs: Annotated[Path, typer.Option(help="Comparison with the weights to export.")] = Path("runs/paper"),

@@ -11,6 +11,7 @@ def test_names_become_flags() -> None:
     assert format_flag("max_depth_m") == "--max-depth-m"
     assert format_flag("num_points", 128) == "--points 128"
     assert format_flag("roll_deg", 90) == "--roll 90"
+    assert format_flag("camera_height_m", 0.8) == "--camera-height 0.8"
     assert format_flag("ignore_viewpoint", True) == "--ignore-viewpoint"
 
 

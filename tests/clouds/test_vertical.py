@@ -67,7 +67,7 @@ def test_surfaces_aslant_tell_directions_apart() -> None:
     assert isinstance(found, Vertical)
     assert abs(found.up[2]) == pytest.approx(1)
     assert not found.shows_floor
-    unclear = find_vertical([WALL, SIDE], SAMPLE)
+    unclear = find_vertical([WALL, plane(0, 1, 0, 0.8, share=0.7)], SAMPLE)
     assert isinstance(unclear, LevelingRefusal)
     assert unclear.values["probability"] < unclear.values["min_probability"]
 

@@ -42,7 +42,7 @@ def test_lines_change_the_options_of_their_files_alone(tmp_path: Path) -> None:
     assert (below.intrinsics, below.roll_deg, below.pitch_deg) == (Pinhole(500, 501, 320, 240), 90, 3)
     assert indexed.of(tmp_path / "c.pcd").axes == "opengl"
     assert indexed.of(tmp_path / "d.pcd").quaternion == (0, 0, 0, 1)
-    assert indexed.of(tmp_path / "d.pcd").pitch_deg == 0
+    assert indexed.of(tmp_path / "d.pcd").pitch_deg is None
     assert indexed.of(tmp_path / "e.pcd") is given
     assert indexed.of(tmp_path / "1" / "2" / "3" / "a.png") is given
 

@@ -333,6 +333,8 @@ def test_parameters_choose_the_predictor(weights: object) -> None:
     ({"budget_ms": float("inf")}, "budget_ms"),
     ({"axes": "map"}, "axes"),
     ({"roll": 450.0}, "roll"),
+    ({"tilt": "level"}, "tilt"),
+    ({"camera_height": 9.0}, "camera_height"),
     ({"quaternion": "1 2"}, "quaternion"),
     ({"silence_s": 0.0}, "silence_s"),
 ])  # fmt: skip

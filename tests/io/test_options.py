@@ -19,6 +19,10 @@ from doorstate.io.options import ReadOptions, metres_per_unit
         ({"roll_deg": 361}, "roll_deg"),
         ({"pitch_deg": 90.5}, "pitch_deg"),
         ({"pitch_deg": np.nan}, "pitch_deg"),
+        ({"camera_height_m": 0.0}, "camera_height_m"),
+        ({"camera_height_m": -1.0}, "camera_height_m"),
+        ({"camera_height_m": 26.0}, "camera_height_m"),
+        ({"camera_height_m": np.nan}, "camera_height_m"),
         ({"axes": "sideways"}, "axes"),
         ({"axes": "flf"}, "axes"),
         ({"axes": "rfd"}, "axes"),
@@ -43,3 +47,23 @@ def test_metres_per_unit() -> None:
     with pytest.raises(ConfigError) as caught:
         metres_per_unit("inch")
     assert caught.value.field == "units"
+
+
+def test_tilt_is_known_if_it_was_given_as_zero_too() -> None:
+    assert not ReadOptions().pose().is_tilt_known
+    assert not ReadOptions(camera_height_m=1.0).pose().is_tilt_known
+    for options in (
+        ReadOptions(pitch_deg=0.0),
+        ReadOptions(roll_deg=0.0),
+        ReadOptions(quaternion=(0, 0, 0, 1)),
+    ):
+        pose = options.pose()
+        assert pose.is_tilt_known
+        assert (pose.roll_deg, pose.pitch_deg) == (0, 0)
+
+
+def test_height_of_the_camera_goes_with_its_pose() -> None:
+    pose = ReadOptions(camera_height_m=0.8, pitch_deg=5).pose()
+    assert pose.camera_height_m == 0.8
+    assert pose.to_dict()["camera_height_m"] == 0.8
+    assert "camera_height_m" not in ReadOptions().pose().to_dict()

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from paper.measurements.dark_leaves import dark_table, measure_dark_leaves
 from paper.measurements.export import ExportResult, export_table, measure_export
@@ -12,6 +13,15 @@ from paper.measurements.frames import varied_frames
 from paper.measurements.gate import FAULTS, gate_table, measure_gate
 from paper.measurements.ghost_results import append_results, method_table, read_results, size_table
 from paper.measurements.ghosts import Ghosts, measure_ghosts
+from paper.measurements.leveling import (
+    Group,
+    LevelingResult,
+    draw_tilt,
+    gazebo_clouds,
+    leveling_table,
+    measure_clouds,
+    simulated_clouds,
+)
 from paper.measurements.outliers import measure_cost, measure_parts, parts_table
 from paper.measurements.thinning import measure_thinning, thinning_table
 
@@ -95,3 +105,31 @@ def test_clean_frames_keep_their_points() -> None:
         assert sum(sums.removed.values()) < 0.01 * sum(sums.measured.values())
     assert len(parts_table(counts).rows) == 2 * len(counts)
     assert len(measure_cost(1).rows) == 3
+
+
+def test_tilts_are_found_and_every_group_has_a_row() -> None:
+    rendered, turned = (
+        measure_clouds(simulated_clouds("varied", "d435", "tilted", 4, rendered=is_rendered))
+        for is_rendered in (True, False)
+    )
+    for results in (rendered, turned, measure_clouds(gazebo_clouds("tilted", 4))):
+        errors = [result.error_deg for result in results if result.error_deg is not None]
+        assert len(errors) >= 2
+        assert max(errors) < 1.5
+    refused = [LevelingResult(None, None, None, "tilt_one_plane")]
+    groups: list[Group] = [
+        ("varied d435", "tilted", "rendered", rendered),
+        ("varied d435", "tilted", "turned", turned),
+        ("none", "level", "rendered", refused),
+    ]
+    table = leveling_table(groups)
+    assert [row[0] for row in table.rows] == ["varied d435", "varied d435", "none", "all", "all", "all"]
+    assert table.rows[2][4:6] == ("0%", "–")
+
+
+def test_drawn_tilts_are_within_their_limits() -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        assert max(map(abs, draw_tilt("level", rng))) <= 1
+        assert max(map(abs, draw_tilt("tilted", rng))) <= 30
+        assert 60 <= abs(draw_tilt("on its side", rng)[0]) <= 120

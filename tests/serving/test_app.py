@@ -132,6 +132,7 @@ def test_frame_roll_units_and_camera_transform_the_cloud(client: httpx.Client) -
         ("format=npy&axes=sideways", NPY, 400, "axes"),
         ("format=npy&roll=450", NPY, 400, "roll"),
         ("format=npy&roll=left", NPY, 400, "roll"),
+        ("format=npy&camera_height=-1", NPY, 400, "camera_height"),
         ("format=npy&units=furlongs", NPY, 400, "units"),
         ("format=npy&depth_scale=nan", NPY, 400, "nan"),
         ("format=npy&fx=3", NPY, 400, "fy"),

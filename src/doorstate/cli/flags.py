@@ -7,6 +7,7 @@ from __future__ import annotations
 _FLAGS = {
     "roll_deg": "--roll",
     "pitch_deg": "--pitch",
+    "camera_height_m": "--camera-height",
     "depth_scale_m": "--depth-scale",
     "units_m": "--units",
     "num_points": "--points",

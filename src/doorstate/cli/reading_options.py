@@ -28,15 +28,26 @@ def read_options(
         ),
     ] = "auto",
     roll: Annotated[
-        float, typer.Option(help="Clockwise rotation of the camera, seen from behind, in degrees.")
-    ] = 0.0,
-    pitch: Annotated[float, typer.Option(help="Angle by which the camera looks down, in degrees.")] = 0.0,
+        float | None, typer.Option(help="Clockwise rotation of the camera, seen from behind, in degrees.")
+    ] = None,
+    pitch: Annotated[
+        float | None,
+        typer.Option(
+            help="Angle by which the camera looks down, in degrees. [default: 0; weights for doorways find the tilt"
+            " themselves if neither is given]",
+            show_default=False,
+        ),
+    ] = None,
     quaternion: Annotated[
         str | None,
         typer.Option(
             help="In place of --roll and --pitch: 'x y z w' of the rotation from the frame of the points to a level"
             " frame, as tf2_echo prints."
         ),
+    ] = None,
+    camera_height: Annotated[
+        float | None,
+        typer.Option(help="Height of the camera above the floor in metres, if it is known."),
     ] = None,
     ignore_viewpoint: Annotated[
         bool, typer.Option("--ignore-viewpoint", help="Ignore VIEWPOINT of PCD files.")
@@ -85,6 +96,7 @@ def read_options(
             roll_deg=roll,
             pitch_deg=pitch,
             quaternion=None if quaternion is None else parse_quaternion(quaternion),
+            camera_height_m=camera_height,
             ignore_viewpoint=ignore_viewpoint,
             intrinsics=camera or pinhole,
             rectified=rectified,
@@ -132,5 +144,8 @@ def check_layout(layout: str | None, options: ReadOptions) -> None:
     """
     from doorstate.io.options import DEFAULT_OPTIONS
 
-    if layout is not None and replace(options, intrinsics=None, rectified=None) != DEFAULT_OPTIONS:
+    if (
+        layout is not None
+        and replace(options, intrinsics=None, rectified=None, camera_height_m=None) != DEFAULT_OPTIONS
+    ):
         raise ConfigError("--layout has its own axes, units and depth scale: give only the camera")

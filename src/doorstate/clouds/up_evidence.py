@@ -2,7 +2,7 @@
 """What a room looks like from a robot, as evidence for a direction up.
 
 Few surfaces are aslant, the floor has nothing below it and lies at a usual height, rooms are not higher than usual, the
-ceiling is well above the camera, and cameras look ahead rather than up or down.
+ceiling is well above the camera, and cameras are mounted squarely, looking ahead rather than up or down.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ WEIGHTS = {
     "ceiling": 0.6,
     "ceiling_height": -1.7,
     "pitch": -1.65,
+    "square": 1.5,  # chosen
     "known_height": 4.0,  # chosen
 }
 HEIGHT_TOLERANCE_M = 0.12  # of a camera's height that is known
@@ -36,6 +37,7 @@ _USUAL_HEIGHT_M, _RARE_HEIGHT_M = 1.4, 1.8  # of a camera, at most
 _USUAL_EXTENT_M, _RARE_EXTENT_M = 3.2, 4.7  # of a room's height
 _USUAL_CEILING_M = 1.7  # above the camera
 _USUAL_PITCH_DEG = 30.0
+_SQUARE_DEG = 4.0  # cameras are mounted squarely, unless on purpose
 _BELOW_M, _MAX_BELOW_SHARE = 0.06, 0.1  # points below the floor
 _EXTREME_SHARE = 0.01  # of the points; lower and higher ones are noise
 
@@ -84,6 +86,7 @@ def evidence(
         "ceiling": float(shows_ceiling),
         "ceiling_height": min(math.log(ceiling_m / _USUAL_CEILING_M) ** 2, 4.0) if shows_ceiling else 0.0,
         "pitch": (math.degrees(math.asin(min(1.0, abs(float(up[0]))))) / _USUAL_PITCH_DEG) ** 2,
+        "square": float(max(abs(up)) >= math.cos(math.radians(_SQUARE_DEG))),
         "known_height": _known_height(height_m, camera_height_m, shows_floor),
     }
 

@@ -2,8 +2,8 @@
 """`index.csv` of frames: one line a file, with its camera where known, and its label.
 
 Column `file` is required, for labelled frames `state` too. `fx`, `fy`, `cx`, `cy`, `width`, `height` (pixels),
-`depth_unit_m`, `axes`, `roll_deg`, `pitch_deg` and `quaternion` override the read options of that file; an empty text
-or `?` is unknown. Further columns are kept. Files are inside the folder of the index.
+`depth_unit_m`, `axes`, `roll_deg`, `pitch_deg`, `quaternion` and `camera_height_m` override the read options of that
+file; an empty text or `?` is unknown. Further columns are kept. Files are inside the folder of the index.
 """
 
 from __future__ import annotations
@@ -24,7 +24,12 @@ from doorstate.io.find import INDEX_FILE
 from doorstate.io.options import ReadOptions
 from doorstate.io.rotations import parse_quaternion
 
-_NUMBERS = {"depth_unit_m": "depth_scale_m", "roll_deg": "roll_deg", "pitch_deg": "pitch_deg"}
+_NUMBERS = {
+    "depth_unit_m": "depth_scale_m",
+    "roll_deg": "roll_deg",
+    "pitch_deg": "pitch_deg",
+    "camera_height_m": "camera_height_m",
+}
 _CAMERA = ("fx", "fy", "cx", "cy")
 _UNKNOWN = ("", "?")
 _LEVELS = 3  # folders above a file that may hold its index, as in Depth/Test/Closed
@@ -141,7 +146,7 @@ def _options(row: Mapping[str, str], options: ReadOptions, index: Path, number: 
         if (axes := row.get("axes", "").strip()) not in _UNKNOWN:
             changes["axes"] = axes
         if (quaternion := row.get("quaternion", "").strip()) not in _UNKNOWN:
-            changes |= {"roll_deg": 0.0, "pitch_deg": 0.0, "quaternion": parse_quaternion(quaternion)}
+            changes |= {"roll_deg": None, "pitch_deg": None, "quaternion": parse_quaternion(quaternion)}
         elif "roll_deg" in changes or "pitch_deg" in changes:
             changes["quaternion"] = None
         return replace(options, **changes)

@@ -24,5 +24,6 @@ def predict_posed(
     Raises:
         CloudContentError, ConfigError: as in `Predictor.__call__`.
     """
-    is_level = pose is None or pose.tilt_from != "assumed"
-    return predictor(points, door_known=door_known, is_level=is_level)
+    is_level = pose is None or pose.is_tilt_known
+    height_m = None if pose is None else pose.camera_height_m
+    return predictor(points, door_known=door_known, is_level=is_level, camera_height_m=height_m)

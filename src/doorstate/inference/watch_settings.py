@@ -66,6 +66,14 @@ class WatchSettings(FrozenModel):
         description="In place of roll and pitch: x, y, z, w of the rotation from the frame of the messages to a level"
         " frame, as tf2_echo prints; empty: none.",
     )
+    tilt: Literal["auto", "given"] = Field(
+        "auto",
+        description="Tilt of the camera; auto: as roll, pitch or quaternion say if one of them is set, else weights for"
+        " doorways find it themselves; given: as they say, zero too.",
+    )
+    camera_height: float = Field(
+        0.0, ge=0, description="Height of the camera above the floor in metres; 0: not known."
+    )
     rectified: Literal["auto", "yes", "no"] = Field(
         "auto", description="Images are rectified; auto: as the name of their topic tells, rect or raw."
     )
@@ -84,11 +92,13 @@ class WatchSettings(FrozenModel):
         Raises:
             CameraError: an impossible value.
         """
+        is_set = bool(self.roll or self.pitch) or (self.tilt == "given" and not self.quaternion)
         return ReadOptions(
             axes=self.axes,
-            roll_deg=self.roll,
-            pitch_deg=self.pitch,
+            roll_deg=self.roll if is_set else None,
+            pitch_deg=self.pitch if is_set else None,
             quaternion=parse_quaternion(self.quaternion) if self.quaternion else None,
+            camera_height_m=self.camera_height or None,
             rectified={"auto": None, "yes": True, "no": False}[self.rectified],
             depth_scale_m=self.depth_scale,
             units_m=UNITS_M[self.units],

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from doorstate.errors import CameraError, unknown_name
 from doorstate.io.camera import Intrinsics, Pinhole
@@ -13,6 +13,7 @@ from doorstate.io.sensor_pose import Origin, SensorPose, camera_pose, pose_from_
 from doorstate.types import UNITS_M
 
 AUTO = "auto"
+MAX_CAMERA_HEIGHT_M = 2.5  # of a robot, or in a raised hand
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,9 +26,12 @@ class ReadOptions:
             down, such as `flu`. `auto` is `optical` if the header of a message names such a frame, else `ros`. Depth
             images are always optical.
         roll_deg: clockwise rotation of the camera, seen from behind: 90 for a camera on its right side.
-        pitch_deg: angle by which the camera looks down; negative if it looks up.
+        pitch_deg: angle by which the camera looks down; negative if it looks up. One of the two alone leaves the other
+            at zero. Without both, and without a quaternion, the tilt is not known: methods that can tell it from the
+            cloud do, others take the camera for level.
         quaternion: x, y, z, w of the rotation from the frame of the points to a level frame (x forward, y left, z up),
             in place of roll and pitch; its heading is left out.
+        camera_height_m: height of the camera above the floor, if it is known.
         ignore_viewpoint: read points of PCD files as points in the frame of the camera, whatever VIEWPOINT says.
         intrinsics: camera of depth images; a `Pinhole` fits every image size.
         rectified: True if depth images of a topic are rectified, False if not; None for what its name tells
@@ -40,9 +44,10 @@ class ReadOptions:
     """
 
     axes: str = AUTO
-    roll_deg: float = 0.0
-    pitch_deg: float = 0.0
+    roll_deg: float | None = None
+    pitch_deg: float | None = None
     quaternion: Quaternion | None = None
+    camera_height_m: float | None = None
     ignore_viewpoint: bool = False
     intrinsics: Intrinsics | Pinhole | None = None
     rectified: bool | None = None
@@ -57,12 +62,18 @@ class ReadOptions:
                     f"{scale_m} metres per unit is impossible", field=field, expected="a positive number"
                 )
         for field, limit_deg in (("roll_deg", 360), ("pitch_deg", 90)):
-            if not abs(getattr(self, field)) <= limit_deg:  # also for NaN
+            if not abs(getattr(self, field) or 0.0) <= limit_deg:  # also for NaN
                 raise CameraError(
                     f"{getattr(self, field)} degrees is impossible",
                     field=field,
                     expected=f"{-limit_deg} to {limit_deg}",
                 )
+        if not 0 < (self.camera_height_m or 1.0) <= MAX_CAMERA_HEIGHT_M or self.camera_height_m == 0:
+            raise CameraError(
+                f"a camera {self.camera_height_m} m above the floor is impossible",
+                field="camera_height_m",
+                expected=f"more than 0, at most {MAX_CAMERA_HEIGHT_M:g}",
+            )
         if self.quaternion is not None and (self.roll_deg or self.pitch_deg):
             raise CameraError("is given with a roll or pitch", field="quaternion", expected="one of them")
         if self.quaternion is not None:
@@ -85,9 +96,17 @@ class ReadOptions:
         """
         axes, axes_from = self._axes(frame_id, is_depth)
         if self.quaternion is not None:
-            return pose_from_quaternion(axes, self.quaternion, axes_from)
-        tilt_from: Origin = "given" if self.roll_deg or self.pitch_deg else "assumed"
-        return camera_pose(axes, self.roll_deg, self.pitch_deg, axes_from, tilt_from)
+            pose = pose_from_quaternion(axes, self.quaternion, axes_from)
+        else:
+            is_given = self.roll_deg is not None or self.pitch_deg is not None
+            pose = camera_pose(
+                axes,
+                self.roll_deg or 0.0,
+                self.pitch_deg or 0.0,
+                axes_from,
+                "given" if is_given else "assumed",
+            )
+        return replace(pose, camera_height_m=self.camera_height_m)
 
     def _axes(self, frame_id: str, is_depth: bool) -> tuple[str, Origin]:
         if is_depth:

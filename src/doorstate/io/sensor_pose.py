@@ -47,6 +47,7 @@ class SensorPose:
         roll_deg, pitch_deg: tilt of the camera, clockwise from behind and down.
         position_m: of the camera in the frame of the points, in metres; zero for points in the frame of the camera.
         axes_from, tilt_from: where axes and tilt come from.
+        camera_height_m: height of the camera above the floor, if it is known.
     """
 
     rotation: Matrix
@@ -56,6 +57,12 @@ class SensorPose:
     position_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     axes_from: Origin = "assumed"
     tilt_from: Origin = "assumed"
+    camera_height_m: float | None = None
+
+    @property
+    def is_tilt_known(self) -> bool:
+        """True if the points in the body frame are level, False if they are taken for level."""
+        return self.tilt_from != "assumed"
 
     def to_body(self, points: NDArray[Any]) -> Points:
         """Return stored points (..., 3), in metres, in the body frame."""
@@ -72,7 +79,7 @@ class SensorPose:
         return stored
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the pose as JSON values; the position is left out where it is zero."""
+        """Return the pose as JSON values, without a position of zero and without a height that is not known."""
         values: dict[str, Any] = {
             "axes": self.axes,
             "axes_from": self.axes_from,
@@ -80,9 +87,11 @@ class SensorPose:
             "pitch_deg": round(self.pitch_deg, 3) + 0.0,
             "tilt_from": self.tilt_from,
         }
-        return values | (
-            {"position_m": [round(x, 4) for x in self.position_m]} if any(self.position_m) else {}
-        )
+        if any(self.position_m):
+            values["position_m"] = [round(x, 4) for x in self.position_m]
+        if self.camera_height_m is not None:
+            values["camera_height_m"] = round(self.camera_height_m, 4)
+        return values
 
 
 class PosedCloud(NamedTuple):

@@ -19,6 +19,9 @@ class SensorPoseResponse(BaseModel):
     position_m: list[float] | None = Field(
         None, description="Position of the camera in the frame of the points, from VIEWPOINT."
     )
+    camera_height_m: float | None = Field(
+        None, description="Height of the camera above the floor, where it was given."
+    )
 
 
 class TiltResponse(BaseModel):

@@ -18,6 +18,7 @@ _FORMATS = [suffix.lstrip(".") for suffix in CLOUD_SUFFIXES]
 _NAMES = {
     "roll_deg": "roll",
     "pitch_deg": "pitch",
+    "camera_height_m": "camera_height",
     "depth_scale_m": "depth_scale",
     "units_m": "units",
     "intrinsics": "fx, fy, cx and cy",
@@ -41,11 +42,20 @@ class PredictQuery(BaseModel):
         description="Directions of x, y and z in clouds: ros (flu), optical (rdf), opengl (rub), or three letters among"
         " f b l r u d; auto is ros.",
     )
-    roll: float = Field(0.0, description="Clockwise rotation of the camera, seen from behind, in degrees.")
-    pitch: float = Field(0.0, description="Angle by which the camera looks down, in degrees.")
+    roll: float | None = Field(
+        None, description="Clockwise rotation of the camera, seen from behind, in degrees."
+    )
+    pitch: float | None = Field(
+        None,
+        description="Angle by which the camera looks down, in degrees. Without roll and pitch the camera is taken for"
+        " level; weights for doorways find the tilt themselves.",
+    )
     quaternion: str | None = Field(
         None,
         description="In place of roll and pitch: x,y,z,w of the rotation from the points' frame to a level frame.",
+    )
+    camera_height: float | None = Field(
+        None, description="Height of the camera above the floor in metres, if it is known."
     )
     ignore_viewpoint: bool = Field(False, description="Ignore VIEWPOINT of PCD files.")
     units: str = Field(
@@ -83,6 +93,7 @@ class PredictQuery(BaseModel):
             roll_deg=self.roll,
             pitch_deg=self.pitch,
             quaternion=None if self.quaternion is None else parse_quaternion(self.quaternion),
+            camera_height_m=self.camera_height,
             ignore_viewpoint=self.ignore_viewpoint,
             intrinsics=camera,
             depth_scale_m=self.depth_scale,
