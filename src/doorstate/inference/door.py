@@ -8,14 +8,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
+from doorstate.doorways.remoteness import remoteness_m
 from doorstate.inference.abstention import Abstention
 from doorstate.inference.seen_through import Opening
 from doorstate.types import ABSTAINED, DoorState
 
 Hinge = Literal["left", "right"]
-# Doors at this bearing count as twice as far away. Chosen: half of the usual view of a depth camera, so that a near
-# door at its edge comes before one that is more than twice as far, straight ahead.
-_DOUBLING_BEARING_DEG = 30.0
 
 
 class DoorFrame(NamedTuple):
@@ -98,11 +96,8 @@ class Door:
 
     @property
     def remoteness_m(self) -> float:
-        """Distance, longer for doors beside the view's axis: the door most in front has the smallest.
-
-        At a bearing of 30 degrees it is twice the distance, at 60 degrees five times.
-        """
-        return self.distance_m * (1 + (self.bearing_deg / _DOUBLING_BEARING_DEG) ** 2)
+        """Distance, longer for doors beside the view's axis (`doorways.remoteness`)."""
+        return remoteness_m(self.x_m, self.y_m)
 
     @property
     def probabilities(self) -> dict[str, float] | None:
