@@ -238,7 +238,8 @@ def _files() -> dict[str, _File]:
         "simulation.json": _File(_read_simulation, (simulation.model_dump_json().encode(),)),
         "rows.csv": _File(_read_rows, (_table(_small_rows("ogurob")),)),
         "replayed.csv": _File(
-            _replay_rows, tuple(_table(_small_rows(name)[:1]) for name in ("ogurob", "cluttered", "no-door"))
+            _replay_rows,
+            tuple(_table(_small_rows(name)[:1]) for name in ("ogurob", "cluttered", "no-door", "two-doors")),
         ),
         "comparison.json": _File(_read_comparison, (json.dumps(comparison).encode(),)),
         "data/dataset.json": _File(_open_dataset, (description.model_dump_json().encode(),)),
