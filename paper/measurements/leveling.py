@@ -130,15 +130,15 @@ def measure_leveling(count: int, progress: Progress) -> list[Group]:
 
 def leveling_table(groups: Sequence[Group]) -> Table:
     """Return one row per source, camera and kind of tilt, and one for all sources of each."""
-    kinds = list(dict.fromkeys((mount, made) for _, mount, made, _ in groups))
     pooled = [
-        (
-            "all",
-            mount,
-            made,
-            [result for group in groups if group[1:3] == (mount, made) for result in group[3]],
+        _pooled(groups, mounts, made)
+        for mounts, made in (
+            (("level",), "rendered"),
+            (("tilted",), "rendered"),
+            (("on its side",), "rendered"),
+            (("tilted", "on its side"), "rendered"),
+            (("tilted", "on its side"), "turned"),
         )
-        for mount, made in kinds
     ]
     return Table(
         "Tilt told from the cloud",
@@ -156,12 +156,20 @@ def leveling_table(groups: Sequence[Group]) -> Table:
             "median floor error, mm",
             *(reason.removeprefix("tilt_").replace("_", " ") for reason in REASONS),
         ),
-        tuple(_line(*group) for group in (*groups, *pooled)),
+        tuple(_line(*group) for group in (*groups, *pooled) if group[3]),
         "Level: within 1 degree. Tilted: roll -30 to 30, pitch -20 to 35 degrees, together at most 30; on its side: a "
         "quarter turn more. Rendered: the tilted camera's own view; turned: the cloud of a camera that looks ahead, "
         "rotated. Errors are those of answered clouds; the last columns count refusals by reason.",
         text_columns=3,
     )
+
+
+def _pooled(groups: Sequence[Group], mounts: Sequence[str], made: str) -> Group:
+    """Return the results of all sources with these cameras."""
+    results = [
+        result for _, mount, how, of_group in groups if mount in mounts and how == made for result in of_group
+    ]
+    return "all", " or ".join(mounts), made, results
 
 
 def measure_time(repeats: int = 41) -> Table:

@@ -123,7 +123,7 @@ def test_tilts_are_found_and_every_group_has_a_row() -> None:
         ("none", "level", "rendered", refused),
     ]
     table = leveling_table(groups)
-    assert [row[0] for row in table.rows] == ["varied d435", "varied d435", "none", "all", "all", "all"]
+    assert [row[0] for row in table.rows] == ["varied d435", "varied d435", "none", *["all"] * 4]
     assert table.rows[2][4:6] == ("0%", "–")
 
 
