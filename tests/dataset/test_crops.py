@@ -217,6 +217,7 @@ def test_frames_without_a_candidate_are_rejected_by_name(
     found(fixed_places)
     summary = prepare_dataset(Preparation(simulations / "no-door", SPEC, crops=BEST), tmp_path / "out", 1)
     assert len(summary.rejected) > 0
+    assert summary.dataset.description.left_out == {"no_door": len(summary.rejected)}
     names = [row["sample_id"] for row in summary.rejected] + summary.dataset.sample_ids
     assert sorted(names) == sorted(row["sample_id"] for row in read_csv(simulations / "no-door/manifest.csv"))
 

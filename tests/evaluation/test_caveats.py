@@ -11,7 +11,9 @@ import pandas as pd
 from doorstate.dataset.splits import PROTOCOLS as SPLIT_PROTOCOLS
 from doorstate.dataset.store import PreparedDataset
 from doorstate.evaluation.caveats import PROTOCOLS, caveats
+from doorstate.evaluation.metrics import macro_f1
 from doorstate.evaluation.predictions import load_results
+from doorstate.types import ABSTAINED
 from tests.evaluation.conftest import MakeComparison
 
 
@@ -48,6 +50,17 @@ def test_full_comparison_has_none(simulated: PreparedDataset, make_comparison: M
 
 def test_imported_data_have_two_more(imported: PreparedDataset, make_comparison: MakeComparison) -> None:
     assert len(caveats(load_results(make_comparison(imported)))) == 4
+
+
+def test_clouds_left_out_count_as_errors(simulated: PreparedDataset, make_comparison: MakeComparison) -> None:
+    results = load_results(make_comparison(simulated))
+    note = caveats(results, {"closed": 3, "no_door": 2})[0]
+    assert note.startswith("5 ")
+    assert "3 closed, 2 no_door" in note
+    for method in results.methods:
+        tested = results.tested_by(method)
+        missed = tested[tested["state"] == "closed"].iloc[:3].assign(predicted=ABSTAINED)
+        assert f"{method} {macro_f1(pd.concat([tested, missed])):.4f}" in note
 
 
 def test_every_protocol_is_explained() -> None:

@@ -76,6 +76,7 @@ def _join(sources: Sequence[Path], folder: Path) -> PreparedDataset:
         thin=datasets[0].description.thin,
         remove_outliers=datasets[0].description.remove_outliers,
         crops=datasets[0].description.crops,
+        left_out=dict(sum((Counter(dataset.description.left_out) for dataset in datasets), Counter())),
         doorstate_version=__version__,
     ).save(folder)
     return open_dataset(folder)

@@ -83,6 +83,12 @@ class SavedPieces(NamedTuple):
                     kept.append(line)
         return kept, rejected
 
+    def left_out(self, rows: Sequence[Mapping[str, str]]) -> dict[str, int]:
+        """Return the number of rows by state that have no cloud at all."""
+        pairs = zip(rows, self.samples, strict=True)
+        states = sorted(row["state"] for row, samples in pairs if all(reason for _, reason in samples))
+        return {state: states.count(state) for state in dict.fromkeys(states)}
+
     def join_clouds(self, target: Path, num_points: int) -> None:
         """Write the clouds of all pieces as one array (M, n, 3)."""
         shape = (self._num_kept, num_points, 3)

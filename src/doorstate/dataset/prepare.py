@@ -128,6 +128,7 @@ def assemble(
         source=preparation.source_name,
         **preparation.spec.model_dump(),
         crops=preparation.crops,
+        left_out=saved.left_out(rows),
         samples=len(kept),
         doorstate_version=__version__,
     ).save(folder)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import Counter
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import Annotated, Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,6 +51,9 @@ class DatasetDescription(FrozenModel):
     thin: bool = False  # sampled from some rows and columns of each image, as a predictor does
     remove_outliers: bool = False  # not in data sets of version 0.1
     crops: Crops | None = None  # of doorways, in the frame of each; None for whole clouds in the sensor frame
+    left_out: dict[str, Annotated[int, Field(ge=1)]] = Field(
+        default_factory=dict
+    )  # clouds by state (rejected.csv)
 
     @property
     def input(self) -> Input:

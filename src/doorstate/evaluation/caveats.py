@@ -3,13 +3,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
+
+import numpy as np
+
 from doorstate.clouds.preparation import NUM_POINTS
 from doorstate.dataset.splits import NUM_FOLDS
+from doorstate.evaluation.metrics import confusion, precision_recall_f1
 from doorstate.evaluation.results import Results
 from doorstate.evaluation.strata import has_strata
 from doorstate.evaluation.stratum_tables import NO_STRATA, NO_TWINS
 from doorstate.evaluation.table import number
 from doorstate.evaluation.undecidable import decidable_ceiling, is_undecidable, records_twins
+from doorstate.pages.colors import STATE_WORDS
+from doorstate.types import ABSTAINED, PREDICTED_LABELS, STATES
 
 PAPER_SAMPLES = 4059  # Kaleci & Turgut 2021: 1353 of each state
 
@@ -31,8 +39,13 @@ PROTOCOLS = {
 }
 
 
-def caveats(results: Results) -> list[str]:
-    """List the caveats of a comparison, the gravest first."""
+def caveats(results: Results, left_out: Mapping[str, int] = MappingProxyType({})) -> list[str]:
+    """List the caveats of a comparison, the gravest first.
+
+    Args:
+        results: a checked comparison.
+        left_out: clouds by state that its data set does not hold, because they could not be prepared.
+    """
     config, manifest = results.config, results.manifest
     notes = []
     if results.missing:
@@ -44,6 +57,15 @@ def caveats(results: Results) -> list[str]:
         notes.append(
             f"Partial: {len(results.missing)} of {total} runs are not finished ({names}). Methods tested on "
             "different folds are not directly comparable."
+        )
+    if left_out:
+        scores = ", ".join(
+            f"{method} {number(_macro_f1_with(results, method, left_out))}" for method in results.methods
+        )
+        counts = ", ".join(f"{count} {STATE_WORDS.get(state, state)}" for state, count in left_out.items())
+        notes.append(
+            f"{sum(left_out.values())} clouds could not be prepared, or no doorway was found in them ({counts}). They "
+            f"are in no table; macro F1 with them as errors: {scores}."
         )
     if config.folds < NUM_FOLDS:
         notes.append(f"Only {config.folds} of {NUM_FOLDS} folds are shown; other samples are untested.")
@@ -66,3 +88,12 @@ def caveats(results: Results) -> list[str]:
             f"correct on more than {number(decidable_ceiling(manifest))} of all samples."
         )
     return notes
+
+
+def _macro_f1_with(results: Results, method: str, left_out: Mapping[str, int]) -> float:
+    """Return the macro F1 of a method with the share of clouds left out that its folds would test as abstentions."""
+    counts = confusion(results.tested_by(method)).astype(np.float64)
+    has_state = int(results.manifest["state"].isin(STATES).sum())
+    missed = np.array([left_out.get(state, 0) for state in STATES])
+    counts[:, PREDICTED_LABELS.index(ABSTAINED)] += missed * counts.sum() / max(1, has_state)
+    return float(precision_recall_f1(counts).macro.f1)

@@ -104,7 +104,7 @@ def render_report(
         config=results.config,
         recipe=json.dumps(results.config.recipe, indent=2, default=str),
         protocol=PROTOCOLS.get(results.config.protocol, ""),
-        caveats=caveats(results),
+        caveats=caveats(results, dataset.description.left_out),
         facts=_facts(results, dataset),
         environment=_environment(results),
         tables=tables,
