@@ -71,21 +71,21 @@ def _lock(folder: Path, suffix: str) -> Iterator[None]:
     # One object per file and thread, so that a thread can own a folder that it owns.
     lock = FileLock(path, is_singleton=True)
     owner = path.with_suffix(".owner")
+    is_outermost = not lock.is_locked
     try:
         lock.acquire(timeout=_WAIT_S, poll_interval=_POLL_S)
-    except Timeout as error:
-        raise _in_use(folder, owner) from error
-    try:
-        is_outermost = lock.lock_counter == 1
         if is_outermost:
             write_text(owner, _record(), durable=False)
         yield
+    except Timeout as error:
+        raise _in_use(folder, owner) from error
     finally:
-        if is_outermost:
-            # Removed while held: a process that has opened the file meanwhile finds it unlinked, and opens a new one.
-            owner.unlink(missing_ok=True)
-            path.unlink(missing_ok=True)
-        lock.release()
+        if lock.is_locked:  # also by an `acquire` that an interrupt ended
+            if is_outermost:
+                # Removed while held: a process that has opened the file meanwhile finds it unlinked, and opens another.
+                owner.unlink(missing_ok=True)
+                path.unlink(missing_ok=True)
+            lock.release()
 
 
 def _check_parts(folder: Path) -> None:

@@ -94,7 +94,7 @@ def _try_at(run: _Run, name: str, number: signal.Signals, delay_s: float, to_wor
     code, errors, left = run.end()
     kind = f"{number.name} at any moment of `{name}`"
     if left:
-        return Try(kind, "temporary files are left", Violation.TORN)
+        return Try(kind, f"left: {', '.join(path.name for path in left)}", Violation.TORN)
     if code not in (0, -number) or any(text in errors for text in _UNWANTED):
         return Try(kind, f"exit code {code}: {errors.strip()[-300:]}", Violation.UNCAUGHT)
     return Try(kind, "ended by the signal" if code else "done")

@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 
 _WORDS = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
 _DEFAULTS = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
-_PAUSE_S = 0.02
+_CAN_WAIT = hasattr(signal, "setitimer")  # not on Windows
+_PAUSE_S = 0.01
 _SHOW_CURSOR = b"\x1b[?25h"
 
 
@@ -72,6 +73,8 @@ def raise_in(work: Callable[[], Result], advice: str = "") -> Result:
             return work()
         finally:
             _State.raises = False
+            if _CAN_WAIT:
+                signal.setitimer(signal.ITIMER_REAL, 0)
     except BaseException as error:
         # Of any kind: libraries raise their own errors when a function that they call is interrupted.
         number = _State.ended_by = _State.raised
@@ -107,7 +110,7 @@ def _raise(number: int, frame: FrameType | None) -> None:
 
 
 def _raise_later(number: int) -> None:
-    if not hasattr(signal, "setitimer"):  # Windows
+    if not _CAN_WAIT:
         _end_at_once(number)
     signal.signal(signal.SIGALRM, lambda _, frame: _raise(number, frame))
     signal.setitimer(signal.ITIMER_REAL, _PAUSE_S)
