@@ -34,16 +34,12 @@ def attack_moments(folder: Path, rounds: int) -> Iterator[Try]:
         ["info"],
         ["--help"],
     ]
-    starts = [start for start in _STARTS if Path(start[0]).exists()]
     for arguments in commands if rounds > 1 else commands[:2]:
-        started = time.monotonic()
-        alone = _Run(folder / "alone", [*starts[0], *map(str, arguments)])
-        assert alone.end()[0] == 0
-        seconds = time.monotonic() - started
+        seconds = min(_seconds([*start, *map(str, arguments)], folder / "alone") for start in _STARTS)
         count = min(rounds, round(100 * seconds)) if rounds > 1 else 2
         for number in range(count):
             for kind in _KINDS if rounds > 1 else _KINDS[number : number + 1]:
-                run = _Run(folder / "run", [*starts[number % len(starts)], *map(str, arguments)])
+                run = _Run(folder / "run", [*_STARTS[number % 2], *map(str, arguments)])
                 yield _try_at(
                     run,
                     str(arguments[0]),
@@ -87,6 +83,12 @@ class _Run:
         left = [path for path in self._folder.rglob("*") if is_scratch(path)]
         shutil.rmtree(self._folder)
         return self._process.returncode, errors, left
+
+
+def _seconds(line: Sequence[str], folder: Path) -> float:
+    started = time.monotonic()
+    assert _Run(folder, line).end()[0] == 0
+    return time.monotonic() - started
 
 
 def _try_at(run: _Run, name: str, number: signal.Signals, delay_s: float, to_workers: bool) -> Try:
