@@ -33,7 +33,7 @@ _MIN_PLANES_SHARE = 0.2  # of the cells; less is clutter or noise
 _AGAINST_WALL_M = 0.5
 _MAX_ERROR_DEG = 2.0
 # By quarter turns of the roll: a camera is mounted upright unless the cloud says otherwise.
-_PRIOR = (0.0, -2.25, -3.0, -2.25)
+_PRIOR = (0.0, -1.75, -3.0, -1.75)
 _MIN_PROBABILITY = (0.8, 0.8, 0.9, 0.8)
 _SAME = math.cos(math.radians(10))
 _EVIDENCE_POINTS = 1024
