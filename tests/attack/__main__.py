@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Repeat all attacks, or some: `python -m tests.attack`, `python -m tests.attack weights graphs --rounds 10`.
 
-`python -m tests.attack service --seconds 60` attacks the service, and prints figures instead of a table.
+`python -m tests.attack service --seconds 60` attacks the service, and prints figures instead of a table;
+with `--one-address` all of its clients have the same address.
 """
 
 from __future__ import annotations
@@ -28,10 +29,14 @@ def main() -> None:
     parser.add_argument(
         "--seconds", type=float, default=60.0, help="duration of each part of the attack on the service"
     )
+    parser.add_argument(
+        "--one-address", action="store_true", help="one address for all clients of the attack on the service"
+    )
     arguments = parser.parse_args()
     if "service" in arguments.names:
         with tempfile.TemporaryDirectory(prefix="doorstate-") as folder:
-            print(json.dumps(attack_service(Path(folder), arguments.seconds), indent=2))
+            figures = attack_service(Path(folder), arguments.seconds, arguments.one_address)
+            print(json.dumps(figures, indent=2))
         return
     tries: list[Try] = []
     for name in arguments.names or ATTACKS:

@@ -123,9 +123,13 @@ class _LocalQueue(WorkQueue):
 
     problem = ""
     waiting = 0
+    is_busy = False
 
-    def check_space(self) -> None:
+    async def wait_for_space(self, client: str, size: int, suffix: str | None) -> None:
         """There is always space."""
+
+    def note_failed_upload(self, client: str, size: int) -> None:
+        """Take no credit."""
 
     def wait_until_ready(self) -> Method:
         return Method("pointnet", network="pointnet")

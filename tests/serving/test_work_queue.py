@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import time
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 
@@ -39,7 +41,8 @@ def wait_for(path: Path) -> None:
 
 
 def test_full_queue_and_slow_worker(tmp_path: Path) -> None:
-    with serving(folder=tmp_path, queue=1, timeout_s=1.0) as client, ThreadPoolExecutor(3) as threads:
+    limits = {"queue": 1, "timeout_s": 1.0, "unread_timeout_s": 0.3}
+    with serving(folder=tmp_path, **limits) as client, ThreadPoolExecutor(3) as threads:
         running = threads.submit(client.post, "/predict?format=npy", content=order(WAIT))
         wait_for(tmp_path / "arrived")
         later = [threads.submit(client.post, "/predict?format=npy", content=NPY) for _ in range(2)]
@@ -86,7 +89,8 @@ def test_memory_of_a_worker_is_limited() -> None:
 
 def test_large_files_leave_the_workers_to_small_ones(tmp_path: Path) -> None:
     large = order(WAIT, points=5000)
-    with serving(folder=tmp_path, large_bytes=10_000, queue=8) as client, ThreadPoolExecutor(2) as threads:
+    limits = {"large_bytes": 10_000, "queue": 8, "unread_timeout_s": 0.3}
+    with serving(folder=tmp_path, **limits) as client, ThreadPoolExecutor(2) as threads:
         waiting = [threads.submit(client.post, "/predict?format=npy", content=large) for _ in range(2)]
         wait_for(tmp_path / "arrived")
         for _ in range(3):
@@ -95,6 +99,84 @@ def test_large_files_leave_the_workers_to_small_ones(tmp_path: Path) -> None:
         error_of(client.post("/predict?format=npy", content=large), 503)
         (tmp_path / "go").touch()
         assert [future.result().status_code for future in waiting] == [200, 200]
+
+
+def test_requests_wait_unread_for_a_place(tmp_path: Path) -> None:
+    with serving(folder=tmp_path, queue=0) as client, ThreadPoolExecutor(6) as threads:
+        running = threads.submit(client.post, "/predict?format=npy", content=order(WAIT))
+        wait_for(tmp_path / "arrived")
+        waiting = [threads.submit(client.post, "/predict?format=npy", content=NPY) for _ in range(5)]
+        time.sleep(0.3)
+        assert not any(future.done() for future in waiting)
+        assert "doorstate_files 1.0" in client.get("/metrics").text, "the others are not received"
+        (tmp_path / "go").touch()
+        assert [future.result().status_code for future in (running, *waiting)] == [200] * 6
+
+
+def test_client_of_failed_files_leaves_the_workers_to_others(tmp_path: Path) -> None:
+    limits = {"failure_s": 0.1, "failure_share": 0.01, "queue": 8, "unread_timeout_s": 0.3}
+    with serving(folder=tmp_path, **limits) as client, ThreadPoolExecutor(2) as threads:
+        transport = httpx.HTTPTransport(local_address="127.0.0.2")
+        with httpx.Client(base_url=client.base_url, transport=transport, timeout=30) as other:
+            for _ in range(8):
+                error_of(other.post("/predict?format=pcd", content=b"nonsense"), 400)
+            assert other.post("/predict?format=npy", content=NPY).status_code == 200, "by the other worker"
+            for _ in range(8):
+                error_of(other.post("/predict?format=pcd", content=b"nonsense"), 400)
+            files = [threads.submit(other.post, "/predict?format=npy", content=order(WAIT)) for _ in range(2)]
+            wait_for(tmp_path / "arrived")
+            for _ in range(3):
+                assert client.post("/predict?format=npy", content=NPY).status_code == 200
+            refused = other.post("/predict?format=npy", content=NPY)
+            error_of(refused, 429)
+            assert 0 < int(refused.headers["retry-after"]) <= 30
+            (tmp_path / "go").touch()
+            assert [future.result().status_code for future in files] == [200, 200]
+
+
+def test_successes_keep_the_credit_of_a_client() -> None:
+    with serving(failure_s=0.1, failure_share=1e-6) as client:
+        processes = len(multiprocessing.active_children())
+        for _ in range(12):
+            error_of(client.post("/predict?format=pcd", content=b"nonsense"), 400)
+            assert client.post("/predict?format=npy", content=NPY).status_code == 200
+        assert len(multiprocessing.active_children()) == processes, "the other worker is not needed"
+
+
+def test_stalled_uploads_take_credit_and_large_files_wait_for_it(tmp_path: Path) -> None:
+    limits = {"failure_s": 0.01, "failure_share": 0.001, "stall_timeout_s": 0.2, "unread_timeout_s": 0.3}
+    with serving(folder=tmp_path, large_bytes=10_000, **limits) as client, ThreadPoolExecutor(1) as threads:
+        large = order(1.0, points=5000)
+        transport = httpx.HTTPTransport(local_address="127.0.0.2")
+        with httpx.Client(base_url=client.base_url, transport=transport, timeout=30) as other:
+            assert other.post("/predict?format=npy", content=large).status_code == 200
+            stalled = other.post("/predict?format=npy", content=_stall(NPY))
+            error_of(stalled, 408)
+            assert other.post("/predict?format=npy", content=large).status_code == 200, "nobody else is there"
+            running = threads.submit(client.post, "/predict?format=npy", content=order(WAIT))
+            wait_for(tmp_path / "arrived")
+            error_of(other.post("/predict?format=npy", content=large), 429)
+            assert client.post("/predict?format=npy", content=large).status_code == 200
+            (tmp_path / "go").touch()
+            assert running.result().status_code == 200
+
+
+def test_large_files_are_received_slowly_beside_small_ones(tmp_path: Path) -> None:
+    large = order(1.0, points=5000)  # 60 kB
+    limits = {"large_bytes": 10_000, "large_bytes_per_s": 100_000.0}
+    with serving(folder=tmp_path, **limits) as client, ThreadPoolExecutor(1) as threads:
+        running = threads.submit(client.post, "/predict?format=npy", content=order(WAIT))
+        wait_for(tmp_path / "arrived")
+        started = time.monotonic()
+        assert client.post("/predict?format=npy", content=large).status_code == 200
+        assert time.monotonic() - started > 0.5
+        (tmp_path / "go").touch()
+        assert running.result().status_code == 200
+
+
+def _stall(content: bytes) -> Iterator[bytes]:
+    yield content[:100]
+    time.sleep(0.6)
 
 
 def test_parallel_clients_get_their_own_predictions(client: httpx.Client) -> None:

@@ -15,12 +15,13 @@ from doorstate import __version__
 from doorstate.serving.access import Access, AccessControl
 from doorstate.serving.api_page import render_api_page
 from doorstate.serving.body import BODY_HEADERS
+from doorstate.serving.clients import client_of_address
 from doorstate.serving.errors import STATUS_DESCRIPTIONS, add_error_handlers
 from doorstate.serving.lingering_close import LingeringClose
 from doorstate.serving.metrics import CONTENT_TYPE, CountRequests, Metrics
 from doorstate.serving.models import ErrorResponse, HealthResponse, PredictionResponse
 from doorstate.serving.request import PredictQuery
-from doorstate.serving.uploads import Uploads
+from doorstate.serving.uploads import IncompleteUpload, Uploads, declared_bytes
 from doorstate.serving.work_queue import WorkQueue
 from doorstate.serving.worker import Job, Reply
 from doorstate.types import ABSTAINED
@@ -55,7 +56,7 @@ def create_app(queue: WorkQueue, access: Access | None = None) -> FastAPI:
         access: permissions of clients; None admits all that name this machine or an address.
     """
     method = queue.wait_until_ready()
-    uploads, metrics = Uploads(queue.limits), Metrics()
+    uploads, metrics = Uploads(queue.limits, lambda: queue.is_busy), Metrics()
     metrics.waiting.set_function(lambda: queue.waiting)
     metrics.bytes_in_flight.set_function(lambda: uploads.total_bytes)
 
@@ -115,17 +116,24 @@ def create_app(queue: WorkQueue, access: Access | None = None) -> FastAPI:
     async def predict(request: Request, query: Annotated[PredictQuery, Query()]) -> Response:
         options, suffix, door_known = query.read_options(), query.suffix(), query.known_door()
         headers = {name: request.headers.get(name, "") for name in BODY_HEADERS}
-        queue.check_space()
+        declared = declared_bytes(request, queue.limits.max_bytes)
+        client = client_of_address(request.client.host if request.client else "")
         limit_s, problem = queue.limits.timeout_s, "the upload was not complete"
         upload = None
         try:
             async with asyncio.timeout(limit_s):
-                upload = await uploads.read(request)
+                await queue.wait_for_space(client, declared, suffix)
+                upload = await uploads.read(request, client, declared)
                 problem = "there was no result"
                 upload.content = bytes(upload.content)  # one copy of a large file, not two
                 job = Job(upload.content, headers, suffix, options, door_known)
-                reply = await queue.run(job, upload.client)
+                reply = await queue.run(job, client)
+        except IncompleteUpload as error:
+            queue.note_failed_upload(client, error.size)
+            raise
         except TimeoutError as error:
+            if upload is None:
+                queue.note_failed_upload(client, 0)
             raise HTTPException(504, f"{problem} after {limit_s:g} s") from error
         finally:
             if upload is not None:

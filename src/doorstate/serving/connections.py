@@ -10,6 +10,7 @@ from typing import Any
 import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
+from doorstate.serving.clients import client_of_address
 from doorstate.serving.limits import Limits
 
 
@@ -40,7 +41,7 @@ class GuardedProtocol(H11Protocol):
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         super().connection_made(transport)
         self._head_timer: asyncio.TimerHandle | None = None
-        self._address = self.client[0] if self.client else ""
+        self._address = client_of_address(self.client[0] if self.client else "")
         self._counted = self.guard.admit(self._address)
         if not self._counted:
             self.end()

@@ -9,7 +9,6 @@ from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
-from starlette.requests import ClientDisconnect
 
 from doorstate.errors import CloudContentError, ConfigError, DoorstateError
 from doorstate.serving.models import ErrorResponse
@@ -24,6 +23,7 @@ STATUS_DESCRIPTIONS = {
     415: "The format of the file is missing or unknown.",
     421: "The Host header names another machine.",
     422: "The file was read, but its cloud cannot be used.",
+    429: "Too many files of this address failed. Retry-After gives the seconds to wait.",
     500: "The service has a fault; its log says more.",
     503: "Too many files are waiting. Retry-After gives the seconds to wait.",
     504: "The file arrived too slowly, took too long to process, or no worker was free in time.",
@@ -57,10 +57,6 @@ def add_error_handlers(app: FastAPI) -> None:
     async def unusable_file(_: Request, error: DoorstateError) -> Response:
         status = 422 if isinstance(error, CloudContentError) else 400
         return _error_response(status, error.describe(format_parameter, with_path=False))
-
-    @app.exception_handler(ClientDisconnect)
-    async def disconnected(_: Request, error: ClientDisconnect) -> Response:
-        return _error_response(400, "the client closed the connection")  # for the log: the client is gone
 
     @app.exception_handler(Exception)
     async def internal_error(_: Request, error: Exception) -> Response:

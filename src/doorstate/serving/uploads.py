@@ -5,13 +5,29 @@ from __future__ import annotations
 
 import asyncio
 from collections import Counter
+from collections.abc import Callable
 from contextlib import AsyncExitStack
 
 from fastapi import HTTPException, Request
+from starlette.requests import ClientDisconnect
 
 from doorstate.serving.limits import Limits
 
 _IDLE_S = 0.5  # an upload without a byte for this time gives way to others
+
+
+class IncompleteUpload(HTTPException):
+    """Upload that stopped.
+
+    Args:
+        status: HTTP status.
+        detail: reason.
+        size: number of bytes that were received.
+    """
+
+    def __init__(self, status: int, detail: str, size: int) -> None:
+        super().__init__(status, detail)
+        self.size = size
 
 
 class Uploads:
@@ -21,25 +37,29 @@ class Uploads:
 
     Args:
         limits: limits of the service.
+        is_busy: returns True while small files are processed; then large ones are received slowly.
     """
 
-    def __init__(self, limits: Limits) -> None:
-        self._limits = limits
+    def __init__(self, limits: Limits, is_busy: Callable[[], bool] = lambda: False) -> None:
+        self._limits, self._is_busy = limits, is_busy
         self._open: set[Upload] = set()
         self._large = asyncio.Semaphore(limits.large_uploads)
         self._client_bytes: Counter[str] = Counter()
         self.total_bytes = 0
 
-    async def read(self, request: Request) -> Upload:
+    async def read(self, request: Request, client: str, declared: int) -> Upload:
         """Return the body of a request, whose bytes count until `release`.
 
+        Args:
+            request: request of which only the head was read.
+            client: name of the client.
+            declared: length in the head, as `declared_bytes` returns it.
+
         Raises:
-            HTTPException: 400 length that is no number, 408 too slow, 411 large without a length, 413 too large,
-                503 too many bytes.
-            ClientDisconnect: the client closed the connection.
+            IncompleteUpload: 408 too slow, 400 the client closed the connection.
+            HTTPException: 411 large without a length, 413 too large, 503 too many bytes.
         """
-        declared = _declared(request, self._limits.max_bytes)
-        upload = Upload(request.client.host if request.client else "", self._limits.stall_timeout_s)
+        upload = Upload(client, self._limits.stall_timeout_s)
         self._open.add(upload)
         try:
             async with AsyncExitStack() as stack:
@@ -61,8 +81,13 @@ class Uploads:
                     self._add(upload, chunk)
                     if declared < large <= len(upload.content):
                         raise HTTPException(411, "a large file needs a Content-Length")
+                    if declared >= large and self._is_busy():
+                        await asyncio.sleep(len(chunk) / self._limits.large_bytes_per_s)
         except TimeoutError as error:
-            raise HTTPException(408, f"no part of the file arrived for {upload.patience_s:g} s") from error
+            problem = f"no part of the file arrived for {upload.patience_s:g} s"
+            raise IncompleteUpload(408, problem, len(upload.content)) from error
+        except ClientDisconnect as error:  # for the log: the client is gone
+            raise IncompleteUpload(400, "the client closed the connection", len(upload.content)) from error
 
     async def _wait_for_place(self, stack: AsyncExitStack) -> None:
         """Take one of the places of large uploads until the stack is closed; meanwhile nothing of it is received."""
@@ -147,8 +172,12 @@ def _now_s() -> float:
     return asyncio.get_running_loop().time()
 
 
-def _declared(request: Request, limit: int) -> int:
-    """Return the number of bytes that the head of a request announces; 0 if it does not."""
+def declared_bytes(request: Request, limit: int) -> int:
+    """Return the number of bytes that the head of a request announces; 0 if it does not.
+
+    Raises:
+        HTTPException: 400 no number, 413 more than the limit.
+    """
     try:
         declared = int(request.headers.get("content-length", 0))
     except ValueError as error:

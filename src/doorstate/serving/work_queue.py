@@ -1,29 +1,31 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files that wait for worker processes; large files have a worker of low priority to themselves."""
+"""Files that wait for worker processes; large files, and clients whose files fail, have a worker of low priority."""
 
 from __future__ import annotations
 
 import asyncio
-import queue
-import threading
-import time
-from concurrent.futures import ThreadPoolExecutor
 
 from fastapi import HTTPException
 
+from doorstate.serving.clients import Credit
+from doorstate.serving.lane import Lane
 from doorstate.serving.limits import Limits
 from doorstate.serving.worker import LOW_PRIORITY, Job, LoadPredictor, Method, Reply, Worker
 
-_SLOW_S = 60.0
 _TEXT = bytes([*range(32, 127), *b"\t\r\n"])
 _TEXT_SAMPLE = 4096
+_TEXT_SUFFIXES = {".csv", ".txt", ".xyz"}
+_LEAST_FAILURE_S = 0.02  # of the process that receives it
+_RECEIVE_S = 5e-3 / 2**20  # for each byte
+_SUCCESS_S = 0.05
 
 
 class WorkQueue:
     """Worker processes and the files that wait for them, for one event loop.
 
     A large file takes long to read. It goes to one more worker, of low priority, so that any number of them slows the
-    others by a few percent; so does a small file that turns out to take long. That worker starts with the first one.
+    others by a few percent; so does a small file that turns out to take long, and each file of a client whose files
+    failed (`Credit`). That worker starts with the first one. The clients take turns.
 
     Args:
         load: loads the predictor, in each worker.
@@ -32,47 +34,77 @@ class WorkQueue:
 
     def __init__(self, load: LoadPredictor, limits: Limits) -> None:
         self.limits = limits
-        self._slow_until: dict[str, float] = {}  # by address
-        self._quick = _Lane([Worker(load, limits) for _ in range(limits.workers)], limits.queue)
-        self._large = _Lane([Worker(load, limits, LOW_PRIORITY)], max(1, limits.queue // 8))
+        self._credit = Credit(limits.failure_s, limits.failure_share)
+        self._quick = Lane([Worker(load, limits) for _ in range(limits.workers)], limits.queue)
+        self._large = Lane([Worker(load, limits, LOW_PRIORITY)], max(1, limits.queue // 8))
+
+    async def wait_for_space(self, client: str, size: int, suffix: str | None) -> None:
+        """Wait until a file may be received.
+
+        Args:
+            client: name of the client.
+            size: bytes of the file that the head of the request announces.
+            suffix: format of the file, if that is known.
+
+        Raises:
+            HTTPException: 429 too many failures of this client, 503 too many files wait.
+        """
+        debt_s = self._credit.seconds_in_debt(client)
+        is_large = self._is_large(size, suffix in _TEXT_SUFFIXES)
+        lane = self._large if debt_s or is_large else self._quick
+        try:
+            async with asyncio.timeout(self.limits.unread_timeout_s):
+                if debt_s and is_large and self.is_busy:
+                    # In vain: a refusal at once would be followed by the next request.
+                    await asyncio.Event().wait()
+                await lane.wait_for_space(client)
+        except TimeoutError as error:
+            if debt_s:
+                reason = "too many files of this address failed"
+                raise HTTPException(429, reason, {"Retry-After": str(debt_s)}) from error
+            raise HTTPException(503, "too many files are waiting", {"Retry-After": "1"}) from error
 
     async def run(self, job: Job, client: str) -> Reply:
         """Return the reply of a worker.
 
         Args:
             job: file to predict.
-            client: address of the client; after a file that took long, its next files are taken for large.
-
-        Raises:
-            HTTPException: 503, too many files wait.
+            client: name of the client.
         """
-        now = time.monotonic()
-        if not self._is_large(job) and self._slow_until.get(client, 0.0) < now:
-            reply = await self._quick.run(job, min(self.limits.quick_timeout_s, self.limits.work_timeout_s))
+        size = len(job.content)
+        is_large = self._is_large(size, _is_text(job.content))
+        if not is_large and not self._credit.seconds_in_debt(client):
+            timeout_s = min(self.limits.quick_timeout_s, self.limits.work_timeout_s)
+            reply, seconds = await self._quick.run(job, client, timeout_s)
+            self._settle(client, reply, seconds)
             if reply.status != 504:
                 return reply
-            self._slow_until = {name: until for name, until in self._slow_until.items() if until > now}
-            self._slow_until[client] = now + _SLOW_S
-        return await self._large.run(job, self.limits.work_timeout_s)
+        reply, _ = await self._large.run(job, client, self.limits.work_timeout_s)
+        if not is_large:
+            self._settle(client, reply, 0.0)
+        return reply
 
-    def _is_large(self, job: Job) -> bool:
-        size = len(job.content)
-        return size >= self.limits.large_bytes or (
-            size >= self.limits.large_text_bytes and _is_text(job.content)
-        )
+    def note_failed_upload(self, client: str, size: int) -> None:
+        """Take credit from a client whose upload was not completed after a number of bytes."""
+        self._credit.change(client, -max(_LEAST_FAILURE_S, size * _RECEIVE_S))
 
-    def check_space(self) -> None:
-        """Refuse an upload that would have to wait with too many others.
+    def _settle(self, client: str, reply: Reply, seconds: float) -> None:
+        if not reply.fault:
+            failed = reply.status != 200
+            self._credit.change(client, -max(_LEAST_FAILURE_S, seconds) if failed else _SUCCESS_S)
 
-        Raises:
-            HTTPException: 503, too many files wait.
-        """
-        self._quick.check_space()
+    def _is_large(self, size: int, is_text: bool) -> bool:
+        return size >= (self.limits.large_text_bytes if is_text else self.limits.large_bytes)
 
     @property
     def problem(self) -> str:
         """Reason why no file can be predicted; empty while the workers do their work."""
         return self._quick.problem
+
+    @property
+    def is_busy(self) -> bool:
+        """True while small files wait or are processed."""
+        return self._quick.taken > 0
 
     @property
     def waiting(self) -> int:
@@ -97,54 +129,3 @@ def _is_text(content: bytes) -> bool:
     """Return True if a file starts as one of text; binary files have only a short header of text."""
     start = content[:_TEXT_SAMPLE]
     return start.isascii() and not start.translate(None, _TEXT)
-
-
-class _Lane:
-    """Workers that share a queue."""
-
-    def __init__(self, workers: list[Worker], length: int) -> None:
-        self._workers = workers
-        self._idle: queue.SimpleQueue[Worker] = queue.SimpleQueue()
-        for worker in workers:
-            self._idle.put(worker)
-        self._threads = ThreadPoolExecutor(len(workers), "doorstate-worker")
-        self._size = len(workers) + length
-        self._lock = threading.Lock()
-        self.taken = 0
-        self.problem = ""
-
-    async def run(self, job: Job, timeout_s: float) -> Reply:
-        self.check_space()
-        self._change(1)
-        future = self._threads.submit(self._work, job, timeout_s)
-        # The place is free when the work is done, which may be after the client got a time-out.
-        future.add_done_callback(lambda _: self._change(-1))
-        return await asyncio.wrap_future(future)
-
-    def check_space(self) -> None:
-        if self.taken >= self._size:
-            raise HTTPException(503, "too many files are waiting", {"Retry-After": "1"})
-
-    def wait_until_ready(self) -> Method:
-        for worker in self._workers:
-            worker.start()
-        *_, method = [worker.wait_until_ready() for worker in self._workers]
-        return method
-
-    def close(self) -> None:
-        for worker in self._workers:
-            worker.close()
-        self._threads.shutdown(cancel_futures=True)
-
-    def _work(self, job: Job, timeout_s: float) -> Reply:
-        worker = self._idle.get()
-        try:
-            reply = worker.run(job, timeout_s)
-            self.problem = reply.fault
-            return reply
-        finally:
-            self._idle.put(worker)
-
-    def _change(self, by: int) -> None:
-        with self._lock:
-            self.taken += by
