@@ -24,7 +24,7 @@ class WorkQueue:
     """Worker processes and the files that wait for them, for one event loop.
 
     A large file takes long to read. It goes to one more worker, of low priority, so that any number of them slows the
-    others by a few percent; so does a small file that turns out to take long, and each file of a client whose files
+    others by a few percent; so does a small file that turns out to take long or much memory, and each file of a client whose files
     failed (`Credit`). That worker starts with the first one. The clients take turns.
 
     Args:
@@ -77,7 +77,7 @@ class WorkQueue:
             timeout_s = min(self.limits.quick_timeout_s, self.limits.work_timeout_s)
             reply, seconds = await self._quick.run(job, client, timeout_s)
             self._settle(client, reply, seconds)
-            if reply.status != 504:
+            if reply.status not in (413, 504):
                 return reply
         reply, _ = await self._large.run(job, client, self.limits.work_timeout_s)
         if not is_large:
