@@ -24,8 +24,8 @@ class WorkQueue:
     """Worker processes and the files that wait for them, for one event loop.
 
     A large file takes long to read. It goes to one more worker, of low priority, so that any number of them slows the
-    others by a few percent; so does a small file that turns out to take long or much memory, and each file of a client whose files
-    failed (`Credit`). That worker starts with the first one. The clients take turns.
+    others by a few percent; so does a small file that turns out to take long or much memory, and each file of a client
+    whose files failed (`Credit`). That worker starts with the first one. The clients take turns.
 
     Args:
         load: loads the predictor, in each worker.
