@@ -124,6 +124,9 @@ def reset_peak() -> None:
 
 def _status_mib(field: str, process: int | str, file: str = "status") -> float:
     status = Path(f"/proc/{process}/{file}")
-    lines = status.read_text(encoding="utf-8").splitlines() if status.exists() else []
+    try:
+        lines = status.read_text(encoding="utf-8").splitlines()
+    except OSError:  # the process ended, or there is no /proc
+        lines = []
     kib = [int(line.split()[1]) for line in lines if line.startswith(field + ":")]
     return kib[0] / 1024 if kib else float("nan")

@@ -4,28 +4,22 @@
 from __future__ import annotations
 
 import asyncio
-import time
+import math
 from collections import deque
 from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 from doorstate.serving.fair_queue import FairQueue
-from doorstate.serving.worker import Job, Method, Reply, Worker
+from doorstate.serving.worker import Done, Job, Method, Worker
 
 _UPLOAD_S = 0.1  # a request that was let in counts so long until its file is here; a slow one must not keep others out
 _WEIGHT = 0.1  # of a file in the mean of the last ones
 
 
-class Done(NamedTuple):
-    """Reply of a worker, and its time."""
-
-    reply: Reply
-    seconds: float
-
-
 class _File(NamedTuple):
     job: Job
     timeout_s: float
+    cpu_s: float
     done: asyncio.Future[Done]
 
 
@@ -67,9 +61,9 @@ class Lane:
         finally:
             self._unread.remove(client, turn)
 
-    async def run(self, job: Job, client: str, timeout_s: float) -> Done:
+    async def run(self, job: Job, client: str, timeout_s: float, cpu_s: float = math.inf) -> Done:
         """Return the reply of a worker; the file leaves the queue if the caller is cancelled."""
-        file = _File(job, timeout_s, asyncio.get_running_loop().create_future())
+        file = _File(job, timeout_s, cpu_s, asyncio.get_running_loop().create_future())
         self._files.push(client, file)
         self.taken += 1
         if self._let_in:
@@ -103,21 +97,19 @@ class Lane:
             task.add_done_callback(self._tasks.discard)
 
     async def _work(self, worker: Worker, client: str, file: _File) -> None:
-        started = time.perf_counter()
         loop = asyncio.get_running_loop()
         try:
-            reply = await loop.run_in_executor(self._threads, worker.run, file.job, file.timeout_s)
+            done = await loop.run_in_executor(self._threads, worker.run, file.job, file.timeout_s, file.cpu_s)
         except Exception as error:
             if not file.done.done():
                 file.done.set_exception(error)
         else:
-            seconds = time.perf_counter() - started
-            self._files.charge(client, seconds)
-            self._unread.charge(client, max(0.0, seconds - self._usual_s))
-            self._usual_s += _WEIGHT * (seconds - self._usual_s)
-            self.problem = reply.fault
+            self._files.charge(client, done.seconds)
+            self._unread.charge(client, max(0.0, done.seconds - self._usual_s))
+            self._usual_s += _WEIGHT * (done.seconds - self._usual_s)
+            self.problem = done.reply.fault
             if not file.done.done():
-                file.done.set_result(Done(reply, seconds))
+                file.done.set_result(done)
         finally:
             # The place is free when the work is done, which may be after the client got a time-out.
             self._idle.append(worker)

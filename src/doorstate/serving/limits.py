@@ -19,7 +19,7 @@ class Limits:
         unread_timeout_s: time that a request waits unread.
         workers: number of files that are processed at the same time, each in a process.
         work_timeout_s: time to read and predict one file; a worker that takes longer is killed.
-        quick_timeout_s: time after which a file is taken for large, and started again as such.
+        quick_timeout_s: processor time after which a file is taken for large, and started again as such.
         large_bytes: files from this size on have one more worker, of low priority, to themselves.
         large_text_bytes: the same for text, which takes longer to read.
         head_timeout_s: time for the head of a request.

@@ -74,8 +74,8 @@ class WorkQueue:
         size = len(job.content)
         is_large = self._is_large(size, _is_text(job.content))
         if not is_large and not self._credit.seconds_in_debt(client):
-            timeout_s = min(self.limits.quick_timeout_s, self.limits.work_timeout_s)
-            reply, seconds = await self._quick.run(job, client, timeout_s)
+            limits = self.limits
+            reply, seconds = await self._quick.run(job, client, limits.work_timeout_s, limits.quick_timeout_s)
             self._settle(client, reply, seconds)
             if reply.status not in (413, 504):
                 return reply
