@@ -35,6 +35,7 @@ from doorstate.serving.request import format_parameter
 START_TIMEOUT_S = 60.0
 LOW_PRIORITY = 19
 _CPUCLOCK_SCHED = 2
+_LEAST_WAIT_S = 0.02
 _LOG = logging.getLogger("doorstate.serving")
 
 LoadPredictor = Callable[[], Predictor]
@@ -137,15 +138,11 @@ class Worker:
             started_s, deadline = self._cpu_s(), time.monotonic() + timeout_s
             self._connection.send(job[1:])
             self._connection.send_bytes(job.content)
-            while not (
-                is_done := self._connection.poll(max(0, min(deadline - time.monotonic(), cpu_s - seconds)))
-            ):
-                seconds = self._cpu_s() - started_s
-                if seconds >= cpu_s or time.monotonic() >= deadline:
-                    break
-            if is_done:
+            has_reply = self._wait_for_reply(deadline, started_s + cpu_s)
+            seconds = self._cpu_s() - started_s
+            if has_reply:
                 reply: Reply = self._connection.recv()
-                return Done(reply, self._cpu_s() - started_s)
+                return Done(reply, seconds)
             problem = error_reply(504, f"the file took more than {min(timeout_s, cpu_s):g} s to process")
         except (EOFError, OSError):
             problem = error_reply(500, "the worker process ended while it processed the file")
@@ -153,6 +150,13 @@ class Worker:
             problem = error_reply(503, str(error))._replace(fault=str(error))
         self._restart()
         return Done(problem, seconds)
+
+    def _wait_for_reply(self, deadline: float, cpu_deadline_s: float) -> bool:
+        """Return True when there is a reply, False after a deadline in time or in processor time of the process."""
+        while (left_s := min(deadline - time.monotonic(), cpu_deadline_s - self._cpu_s())) > 0:
+            if self._connection.poll(max(left_s, _LEAST_WAIT_S)):
+                return True
+        return self._connection.poll(0)
 
     def _cpu_s(self) -> float:
         """Return the processor time of the process (clock_getcpuclockid(3)); other systems than Linux give the time."""
