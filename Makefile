@@ -5,7 +5,7 @@
 # make publish: results of EXPERIMENT into results/, and the pages that follow from them into docs/;
 # make report: tables, figures and report of EXPERIMENT from results/ into build/;
 # make reproduce-check: compare all published tables with those that the committed predictions give;
-# make lock: versions and hashes of all packages (OPTIONS=--upgrade: the newest); make audit: known vulnerabilities in them;
+# make lock: versions and hashes of all packages (OPTIONS=--upgrade: the newest); make audit: known vulnerabilities in them, and faults of the workflows;
 # make dist: wheel, sdist and the wheel's bill of materials, in dist/.
 VENV := .venv
 BIN := $(VENV)/bin
@@ -67,6 +67,9 @@ lock: $(RELEASE)/.complete
 
 audit: $(RELEASE)/.complete
 	$(RELEASE)/bin/python tools/audit.py
+	$(RELEASE)/bin/check-jsonschema --builtin-schema vendor.github-workflows .github/workflows/*.yml
+	$(RELEASE)/bin/check-jsonschema --builtin-schema vendor.dependabot .github/dependabot.yml
+	$(RELEASE)/bin/zizmor --offline --quiet --min-severity medium .github
 
 dist: $(RELEASE)/.complete
 	bash tools/dist.sh $(RELEASE) dist
