@@ -35,7 +35,7 @@ class _State:
     """State of the program: what a signal does, and the signals that came."""
 
     raises = False
-    raised: int | None = None
+    received: int | None = None
     ended_by: int | None = None
 
 
@@ -66,7 +66,7 @@ def raise_in(work: Callable[[], Result], advice: str = "") -> Result:
     Raises:
         SystemExit: a signal ended the work; the same signal ends the interpreter when it has cleaned up.
     """
-    _State.raised = None
+    _State.received = None
     try:
         try:
             _State.raises = True
@@ -76,8 +76,9 @@ def raise_in(work: Callable[[], Result], advice: str = "") -> Result:
             if _CAN_WAIT:
                 signal.setitimer(signal.ITIMER_REAL, 0)
     except BaseException as error:
-        # Of any kind: libraries raise their own errors when a function that they call is interrupted.
-        number = _State.ended_by = _State.raised
+        # Of any kind: libraries raise their own errors when a function that they call is interrupted, and so do those
+        # who wait for a worker that the signal has ended.
+        number = _State.ended_by = _State.received
         if number is None and not isinstance(error, KeyboardInterrupt):
             raise
         number = number or signal.SIGINT
@@ -89,6 +90,7 @@ def _handle(number: int, frame: FrameType | None) -> None:
     leave_signals()  # a second one need not wait for the interpreter
     if not _State.raises:
         _end_at_once(number)
+    _State.received = number
     others = sys.unraisablehook
 
     def raise_again(unraisable: sys.UnraisableHookArgs) -> None:
@@ -105,7 +107,6 @@ def _raise(number: int, frame: FrameType | None) -> None:
     if _is_fragile(frame):
         _raise_later(number)
     elif _State.raises:  # else the work ended meanwhile
-        _State.raised = number
         raise KeyboardInterrupt if number == signal.SIGINT else Terminated
 
 

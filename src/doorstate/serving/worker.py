@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 
 from fastapi import HTTPException
 
+from doorstate._jobs import interrupts_blocked
 from doorstate.errors import CloudContentError, DoorstateError
 from doorstate.inference.known import DoorKnown
 from doorstate.inference.network_predictor import NetworkPredictor
@@ -190,7 +191,8 @@ class Worker:
         self._process = context.Process(
             target=_serve_jobs, args=(child, *self._arguments), name="doorstate-worker", daemon=True
         )
-        self._process.start()
+        with interrupts_blocked():
+            self._process.start()
         child.close()
         self._ready = None
 
