@@ -29,6 +29,15 @@ AbstentionCode = Literal[
     "invalid_outputs",  # of the network: not finite, or no probabilities
     "door_hole",  # a dark or glass leaf, or an open door into nothing
     "opening_not_seen",  # called open, but the floor behind the opening was not measured
+    "door_too_near",  # these by the check of each doorway
+    "door_out_of_range",
+    "door_out_of_view",
+    "door_occluded",
+    "door_dark",
+    "door_glass",
+    "door_not_measured",
+    "opening_blocked",  # called open, but a surface fills the opening
+    "leaf_out_of_view",
     "no_floor",  # neither in view nor known
     "no_doorway",  # no wall with a place for a door
     "no_door",
@@ -73,6 +82,21 @@ SENTENCES: dict[AbstentionCode, str] = {
         "called open, but only {share:.0%} of the rays to the floor behind the opening came back, {min_share:.0%} are "
         "needed: a dark or glass leaf, or missing data"
     ),
+    "door_too_near": "what surrounds the door's hole is {range_m:.2f} m away: nearer than the camera measures",
+    "door_out_of_range": "the wall of the door is {range_m:.1f} m away, at the end of what the camera measures",
+    "door_out_of_view": "too little of the door is in view",
+    "door_occluded": "something stands before {share:.0%} of the door",
+    "door_dark": (
+        "nothing came back from {share:.0%} of the opening, though its frame was measured: closed with a dark or "
+        "glossy leaf, or open into nothing"
+    ),
+    "door_glass": (
+        "{share:.0%} of the opening was seen through, but not the floor behind it, and nothing came back from "
+        "{missing_share:.0%}: glass, or missing data"
+    ),
+    "door_not_measured": "{share:.0%} of the opening and the floor before it were not measured: missing data",
+    "opening_blocked": "called open, but a surface fills {share:.0%} of the opening",
+    "leaf_out_of_view": "called semi-open, but no leaf was seen: it is out of view, or nothing came back from it",
     "no_floor": "the floor is not in view, and the height of the camera is not given",
     "no_doorway": "no wall in view has a place for a door",
     "no_door": "there seems to be no door: its probability is {probability:.2f}",

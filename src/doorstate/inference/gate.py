@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +16,10 @@ from doorstate.clouds.preparation import MIN_POINTS
 from doorstate.errors import ConfigError
 from doorstate.inference.abstention import Abstention
 from doorstate.inference.door import Door
+from doorstate.inference.doorway_check import DoorwayCheck, DoorwayLimits, check_doorway
 from doorstate.inference.holes import find_holes
 from doorstate.inference.seen_through import Opening, seen_share
-from doorstate.types import DoorState, Points
+from doorstate.types import Points
 
 _SHARES = (
     "min_measured_share",
@@ -28,17 +29,12 @@ _SHARES = (
     "margin_share",
     "max_outlier_share",
     "min_seen_share",
+    "max_missing_share",
+    "min_floor_share",
 )
 _MAX_MARGIN_SHARE = 0.4
 _LARGE_IMAGE_ROWS = 240  # from here on every other row and column is enough
 _STATISTICS_POINTS = 8192
-
-
-class DoorwayCheck(NamedTuple):
-    """Result of a check of one door."""
-
-    abstention: Abstention | None  # reason why its state is refused
-    leaf_seen: bool | None = None  # of an open door; None where nobody looked
 
 
 @dataclass(frozen=True)
@@ -71,6 +67,11 @@ class Gate:
         margin_share: columns ignored on each side; chosen: stereo and registered cameras measure nothing in up to a
             tenth.
 
+        max_missing_share: of one doorway (`check_doorway`): largest share of its opening from which nothing came back;
+            chosen: a tenth of the image may be lost on a door that fills a quarter of it.
+        min_floor_share: of one doorway: least share of the rays to the floor behind an opening without a visible leaf
+            that came back; chosen: none come back from dark leaves, and half may be lost.
+
     Raises:
         ConfigError: a share below 0 or above 1, or margins that leave no column.
     """
@@ -88,6 +89,8 @@ class Gate:
     margin_share: float = 0.1
     max_outlier_share: float = 0.1
     min_seen_share: float = 0.95
+    max_missing_share: float = 0.4
+    min_floor_share: float = 0.5
 
     def __post_init__(self) -> None:
         # A share out of range would switch its check off silently.
@@ -133,14 +136,14 @@ class Gate:
         return self._first_reason(cloud, outlier_share, checks)
 
     def check_doorway(self, cloud: Points, door: Door) -> DoorwayCheck:
-        """Return what a level cloud shows of a door that a network has given a state.
+        """Return what a level cloud shows of a door that a network has given a state: a reason against it, or none.
 
         Args:
             cloud: as for a call, level.
             door: door in the frame of the cloud.
         """
-        abstention = self.check_opening(cloud, door.opening) if door.state is DoorState.OPEN else None
-        return DoorwayCheck(abstention)
+        limits = DoorwayLimits(self.max_missing_share, self.min_floor_share, self.free_reach_m)
+        return check_doorway(np.asarray(cloud), door, limits)
 
     def check_opening(self, cloud: Points, opening: Opening) -> Abstention | None:
         """Return the reason why an opening that a network or rule calls open is none, or None if it may be one.

@@ -22,6 +22,7 @@ _BEHIND_M = np.arange(0.1, 2.5, 0.1)  # along the ray
 _DEPTH_SPOTS = 9  # the nearest in view of each line: as far as a leaf reaches
 _MIN_REACH_M = 0.5  # behind the opening, however far away it is
 _BEFORE_M = 0.3  # what stands as far before the wall says nothing of the opening
+_PASSED_M = 0.15  # a leaf that lies deeper than its wall is nearer
 _MAX_GAP = 1.5  # of view_cells.nearest_measured
 _MAX_POINTS = 4096  # about the opening
 _MIN_SPOTS = 12
@@ -67,8 +68,23 @@ class Opening(NamedTuple):
         )
 
 
+class FloorRays(NamedTuple):
+    """Rays to the floor behind an opening that nothing before the wall hides."""
+
+    seen: float  # share that came back
+    passed: float  # share that came back from behind the opening
+
+
 def seen_share(cloud: Points, measured: NDArray[np.bool_], opening: Opening, reach_m: float) -> float | None:
-    """Return the share of the rays to the floor behind an opening that came back; None where no floor is in view.
+    """Return the share of the rays to the floor behind an opening that came back; arguments as for `floor_rays`."""
+    rays = floor_rays(cloud, measured, opening, reach_m)
+    return None if rays is None else rays.seen
+
+
+def floor_rays(
+    cloud: Points, measured: NDArray[np.bool_], opening: Opening, reach_m: float
+) -> FloorRays | None:
+    """Return what came back of the rays to the floor behind an opening; None where no floor is in view.
 
     Args:
         cloud: (N, 3) or organized (H, W, 3) metres, sensor frame.
@@ -99,13 +115,15 @@ def seen_share(cloud: Points, measured: NDArray[np.bool_], opening: Opening, rea
     points = points[near]
     points = points[:: max(1, len(points) // _MAX_POINTS)].astype(np.float64)
     if len(points) <= NEIGHBOUR:
-        return 0.0
+        return FloorRays(0.0, 0.0)
     tangents = points[:, 1:] / points[:, :1]
     is_measured, nearest = nearest_measured(tangents, rays, _MAX_GAP)
-    before = is_measured & (_behind_m(opening, points[nearest]) < -_BEFORE_M)
+    behind_m = _behind_m(opening, points[nearest])
+    before = is_measured & (behind_m < -_BEFORE_M)
     if (~before).sum() < _MIN_SPOTS:
         return None
-    return float(is_measured[~before].mean())
+    passed = is_measured & (behind_m > _PASSED_M)
+    return FloorRays(float(is_measured[~before].mean()), float(passed[~before].mean()))
 
 
 def _ends(outline_m: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

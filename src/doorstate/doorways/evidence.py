@@ -1,0 +1,225 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a cloud shows of one doorway: shares of the cells of its opening, and what surrounds those that are missing.
+
+A cell is missing if no sight line crosses it although the wall on both sides of its row is measured densely enough, so
+that far or grazing walls, and rows out of view, are no holes.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from doorstate.doorways.doorway import Doorway
+from doorstate.doorways.elevation import ROW_M, Elevation, wall_elevation
+from doorstate.doorways.plan_lines import Floats, Line
+from doorstate.doorways.walls import Wall
+
+_RIM_M = 0.6  # stretch of wall on each side
+_EDGE_M = 0.1  # of the opening, which its frame may hide
+_ROWS = slice(round(0.1 / ROW_M), round(2.0 / ROW_M))  # above thresholds, below lintels
+_POOLS = (1, 2, 3)  # cells that are taken together, in both directions, where points are few
+_MIN_EXPECTED = 6.0  # sight lines of a cell: one in 400 such cells is empty by chance
+_BEFORE_M = (0.1, 1.0)  # floor before an opening
+_FLOOR_M = 0.1  # of a point to the height of the floor
+_MIN_FLOOR_POINTS = 8
+_RANGE_QUANTILES = (0.002, 0.995)
+_FLUSH_M = 0.05  # of the depth of a cell to the middle one of the opening: noise at 3 m
+
+Cells = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class DoorwayEvidence:
+    """Shares of the cells of an opening that are in view, and ranges about it; the first four shares sum to 1.
+
+    Attributes:
+        in_view: share of the opening's cells that are in view.
+        on_wall: share in which the wall or a leaf in it was measured.
+        through: share through which something farther behind was measured.
+        hidden: share before which something stands.
+        missing: share from which nothing came back.
+        flush: share in which a surface lies in one plane along the wall, as the wall itself or a closed leaf does.
+        rim_m: median range of the wall beside the opening; NaN if none was measured.
+        hole_m: least range of what surrounds the missing cells; NaN if none are missing.
+        nearest_m: least range in the cloud.
+        farthest_m: largest range in the cloud.
+        has_floor_before: True if the floor before the opening was measured.
+    """
+
+    in_view: float
+    on_wall: float
+    through: float
+    hidden: float
+    missing: float
+    flush: float
+    rim_m: float
+    hole_m: float
+    nearest_m: float
+    farthest_m: float
+    has_floor_before: bool
+
+
+def find_evidence(points: NDArray[np.float32], doorway: Doorway) -> DoorwayEvidence:
+    """Return what a cloud shows of a doorway.
+
+    Args:
+        points: (N, 3) measured points, metres, level sensor frame.
+        doorway: pose and width of the doorway.
+    """
+    wall, middle_m = _wall_of(doorway)
+    elevation = wall_elevation(wall, points, doorway.floor_z_m)
+    offsets_m = elevation.positions_m - middle_m
+    half_m = doorway.width_m / 2
+    stretch = np.abs(offsets_m) < half_m + _RIM_M
+    opening = np.abs(offsets_m[stretch]) < half_m - _EDGE_M
+    rims = [side * offsets_m[stretch] > half_m for side in (-1, 1)]
+    kinds = np.stack([elevation.on_wall, elevation.through, elevation.hidden])[:, stretch, _ROWS]
+    kinds = kinds.astype(np.float64)
+    ranges_m = _ranges_m(elevation, wall, doorway.floor_z_m)[stretch, _ROWS]
+    in_view, expected = _expected(kinds.sum(axis=0), opening, rims)
+    shares, is_missing = _shares(kinds, expected, in_view)
+    ranges = np.quantile(np.linalg.norm(points[:: max(1, len(points) // 4096)], axis=1), _RANGE_QUANTILES)
+    rim = ranges_m[rims[0] | rims[1]]
+    return DoorwayEvidence(
+        float(in_view[opening].mean()) if opening.any() else 0.0,
+        *shares,
+        flush=_flush(kinds[0], elevation.relief_m[stretch, _ROWS], in_view),
+        rim_m=_median(rim),
+        hole_m=_hole_range_m(is_missing, ranges_m),
+        nearest_m=float(ranges[0]),
+        farthest_m=float(ranges[1]),
+        has_floor_before=_has_floor_before(points, doorway),
+    )
+
+
+def _wall_of(doorway: Doorway) -> tuple[Wall, float]:
+    """Return the stretch of wall about a doorway, and the place of its middle along the wall's line."""
+    yaw = math.radians(doorway.yaw_deg)
+    direction = np.array([math.cos(yaw), math.sin(yaw)])
+    middle = np.array([doorway.x_m, doorway.y_m])
+    middle_m = float(middle @ direction)
+    line = Line(middle - middle_m * direction, direction)
+    half_m = doorway.width_m / 2 + _RIM_M
+    return Wall(line, middle_m - half_m, middle_m + half_m, 0.0), middle_m
+
+
+def _ranges_m(elevation: Elevation, wall: Wall, floor_z_m: float) -> Cells:
+    """Return the ranges (columns, rows) of the nearest kind of surface in each cell; NaN where there is none."""
+    distance_m = max(wall.distance_m, 1e-3)
+    up_m = floor_z_m + (np.arange(elevation.on_wall.shape[1]) + 0.5) * ROW_M
+    to_plane_m = np.sqrt(distance_m**2 + elevation.positions_m[:, None] ** 2 + up_m**2)
+    depth_m = np.full(elevation.on_wall.shape, np.nan)
+    for counts, depths_m in (
+        (elevation.through, elevation.behind_m),
+        (elevation.on_wall, elevation.relief_m),
+        (elevation.hidden, elevation.before_m),
+    ):
+        depth_m = np.where(counts > 0, depths_m, depth_m)
+    ranges_m: Cells = to_plane_m * (1 + depth_m / distance_m)
+    return ranges_m
+
+
+def _expected(seen: Cells, opening: NDArray[np.bool_], rims: list[NDArray[np.bool_]]) -> tuple[Cells, Cells]:
+    """Return the cells (columns, rows) of the opening that are in view, and the sight lines expected in each.
+
+    Sight lines through a plane get fewer smoothly with its range, whatever they end on, so that those of the rims tell
+    how many to expect between them. With one rim in view, cells count up to the outermost that was seen.
+    """
+    right, left = (_row_density(seen[rim]) for rim in rims)
+    share = np.linspace(0, 1, int(opening.sum()))[:, None]  # from the right rim to the left one
+    both = (right > 0) & (left > 0)
+    one = np.maximum(right, left)
+    floor = 1e-9
+    between = np.maximum(right, floor) ** (1 - share) * np.maximum(left, floor) ** share
+    filled = seen[opening] > 0
+    from_right = np.cumsum(filled[::-1], axis=0)[::-1] > 0  # up to the outermost seen cell
+    from_left = np.cumsum(filled, axis=0) > 0
+    up_to = np.where(right > 0, from_right, from_left) & (one > 0)
+    expected = np.where(both, between, np.broadcast_to(one, between.shape))
+    shape = seen.shape
+    in_view, all_expected = np.zeros(shape, dtype=bool), np.zeros(shape)
+    in_view[opening] = np.where(both, True, up_to)
+    all_expected[opening] = expected
+    return in_view.astype(np.float64), all_expected
+
+
+def _row_density(rim: Cells) -> Cells:
+    """Return the mean number of sight lines (rows) of the cells of a rim that were measured; 0 where too few were."""
+    if len(rim) == 0:
+        return np.zeros(rim.shape[1])
+    padded = np.pad(rim, ((0, 0), (1, 1)), mode="edge")
+    about = (padded[:, :-2] + padded[:, 1:-1] + padded[:, 2:]) / 3
+    filled = about > 0
+    density: Cells = np.where(filled.sum(axis=0) >= 2, about.sum(axis=0) / np.maximum(filled.sum(axis=0), 1), 0)
+    return density
+
+
+def _shares(
+    kinds: Cells, expected: Cells, in_view: Cells
+) -> tuple[tuple[float, float, float, float], NDArray[np.bool_]]:
+    """Return the shares on the wall, through, hidden and missing, and the missing cells (columns, rows)."""
+    is_missing = np.zeros(in_view.shape, dtype=bool)
+    if in_view.sum() == 0:
+        return (0.0, 0.0, 0.0, 0.0), is_missing
+    seen = kinds.sum(axis=0)
+    for pool in _POOLS:
+        lines, cells = _pooled(expected * in_view, pool), _pooled(in_view, pool)
+        counted = (cells >= 0.5 * pool**2) & (lines >= _MIN_EXPECTED)
+        if counted.sum() >= 0.5 * (cells >= 0.5 * pool**2).sum() and counted.any():
+            break
+    else:
+        counted = cells > 0  # too few points to tell a hole from chance in each cell
+    pooled = np.stack([_pooled(kind * in_view, pool) for kind in kinds])
+    totals = pooled.sum(axis=0)
+    empty = counted & (totals == 0)
+    filled = counted & (totals > 0)
+    weights = cells / cells[counted].sum()
+    parts = [float((part / np.maximum(totals, 1) * weights)[filled].sum()) for part in pooled]
+    wide = np.kron(empty, np.ones((pool, pool), dtype=bool))[: seen.shape[0], : seen.shape[1]]
+    return (parts[0], parts[1], parts[2], float(weights[empty].sum())), wide & (in_view > 0) & (seen == 0)
+
+
+def _flush(on_wall: Cells, relief_m: NDArray[np.float32], in_view: Cells) -> float:
+    """Return the share of the cells in view whose surface is as deep as the middle one of the opening."""
+    measured = (on_wall > 0) & (in_view > 0)
+    if not measured.any():
+        return 0.0
+    depths_m = relief_m[measured]
+    near = np.abs(depths_m - np.median(depths_m)) <= _FLUSH_M
+    return float(near.sum() / in_view.sum())
+
+
+def _pooled(cells: Cells, pool: int) -> Cells:
+    """Return the sums of blocks of cells."""
+    if pool == 1:
+        return cells
+    columns, rows = (-(-size // pool) for size in cells.shape)
+    padded = np.zeros((columns * pool, rows * pool))
+    padded[: cells.shape[0], : cells.shape[1]] = cells
+    sums: Cells = padded.reshape(columns, pool, rows, pool).sum(axis=(1, 3))
+    return sums
+
+
+def _hole_range_m(is_missing: NDArray[np.bool_], ranges_m: Cells) -> float:
+    """Return the median of the nearer half of the ranges of the cells beside missing ones."""
+    padded = np.pad(is_missing, 1)
+    beside = padded[:-2, 1:-1] | padded[2:, 1:-1] | padded[1:-1, :-2] | padded[1:-1, 2:]
+    near_m = ranges_m[beside & ~is_missing]
+    near_m = near_m[np.isfinite(near_m)]
+    return float(np.quantile(near_m, 0.25)) if len(near_m) else math.nan
+
+
+def _has_floor_before(points: NDArray[np.float32], doorway: Doorway) -> bool:
+    low = points[np.abs(points[:, 2] - np.float32(doorway.floor_z_m)) < _FLOOR_M]
+    x, y, _ = doorway.to_doorway(low).T
+    before = (np.abs(x) < doorway.width_m / 2) & (y > _BEFORE_M[0]) & (y < _BEFORE_M[1])
+    return int(before.sum()) >= _MIN_FLOOR_POINTS
+
+
+def _median(values: Floats) -> float:
+    finite = values[np.isfinite(values)]
+    return float(np.median(finite)) if len(finite) else math.nan

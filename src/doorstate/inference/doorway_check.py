@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Check of one door: does the cloud show at its place what its state says, and if not, why."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from doorstate.doorways.doorway import Doorway
+from doorstate.doorways.evidence import DoorwayEvidence, find_evidence
+from doorstate.doorways.finder import thinned
+from doorstate.doorways.leaf_sweep import SEMI_OPEN_ANGLES_DEG, sweep_leaf
+from doorstate.inference.abstention import Abstention
+from doorstate.inference.door import Door
+from doorstate.inference.seen_through import floor_rays
+from doorstate.types import DoorState, Points
+
+_MAX_POINTS = 20_000  # of a cloud: a dozen for each cell of a door 2.5 m away
+_MIN_IN_VIEW = 0.06  # of an opening
+_MIN_SURFACE = 0.25  # of a closed door
+_MIN_PART = 0.15  # of a leaf that is pushed aside, as of sliding doors
+_MIN_THROUGH = 0.1
+_MAX_HIDDEN = 0.6
+_FILLED = 0.75  # of what is measured of an opening, by a surface along the wall
+_MIN_FILLED = 0.3  # of an opening, of which at least half is in view
+_CROSSED, _CROSSED_FLOOR = 0.05, 0.25  # of an opening with a leaf, and of the rays to the floor behind
+_GLASS = 0.05  # of an opening that is seen through, although little came back
+_NEAR_RATIO, _NEAR_M = 1.25, 1.0  # of the surroundings of a hole to the least range of the cloud, and at most
+_FAR_RATIO, _FAR_M = 0.8, 4.0  # of the wall to the largest range, and at least: rooms end at walls
+
+
+class DoorwayCheck(NamedTuple):
+    """Result of a check of one door."""
+
+    abstention: Abstention | None  # reason why its state is refused
+    leaf_seen: bool | None = None  # of an open door; None where nobody looked
+
+
+class DoorwayLimits(NamedTuple):
+    """Limits of the check; `Gate` explains them."""
+
+    max_missing_share: float
+    min_floor_share: float
+    free_reach_m: float
+
+
+class _Case(NamedTuple):
+    """A door, what its doorway shows, and the points to look at."""
+
+    points: NDArray[np.float32]
+    door: Door
+    doorway: Doorway
+    evidence: DoorwayEvidence
+    limits: DoorwayLimits
+
+
+def check_doorway(cloud: Points, door: Door, limits: DoorwayLimits) -> DoorwayCheck:
+    """Return the reason against the state of a door, or None, and whether the leaf of an open one was seen.
+
+    Args:
+        cloud: (N, 3) or organized (H, W, 3) metres, level sensor frame.
+        door: door with a state; without one there is nothing to check.
+        limits: limits.
+    """
+    points = thinned(cloud)
+    points = points[:: max(1, round(len(points) / _MAX_POINTS))]
+    if door.state is None or len(points) == 0:
+        return DoorwayCheck(None)
+    floor_z_m = float(np.quantile(points[:, 2], 0.01)) if door.floor_z_m is None else door.floor_z_m
+    doorway = Doorway(door.x_m, door.y_m, door.yaw_deg, door.width_m, floor_z_m)
+    evidence = find_evidence(points, doorway)
+    if evidence.in_view < _MIN_IN_VIEW:
+        return DoorwayCheck(Abstention("door_out_of_view"))
+    return _CHECKS[door.state](_Case(points, door, doorway, evidence, limits))
+
+
+def _check_closed(case: _Case) -> DoorwayCheck:
+    """Require a surface in the opening."""
+    evidence = case.evidence
+    if evidence.on_wall >= _MIN_SURFACE:
+        return DoorwayCheck(None)
+    return DoorwayCheck(_hidden(evidence, 0.5) or _reason(evidence))
+
+
+def _check_semi_open(case: _Case) -> DoorwayCheck:
+    """Require a leaf, or a surface that is not flush with the wall or leaves a part of the opening free."""
+    evidence = case.evidence
+    is_askew = evidence.on_wall >= _MIN_SURFACE and evidence.flush < 0.8 * evidence.on_wall
+    is_aside = evidence.flush >= _MIN_PART and evidence.through >= _MIN_THROUGH
+    is_missing = evidence.missing > case.limits.max_missing_share
+    if (is_askew or is_aside) and not is_missing:
+        return DoorwayCheck(None)
+    if sweep_leaf(case.points, case.doorway, SEMI_OPEN_ANGLES_DEG) is not None:
+        return DoorwayCheck(None)
+    if is_missing:
+        return DoorwayCheck(_reason(evidence))
+    return DoorwayCheck(_hidden(evidence, _MAX_HIDDEN) or Abstention("leaf_out_of_view"))
+
+
+def _check_open(case: _Case) -> DoorwayCheck:
+    """Require an opening that is not filled, and a leaf or the floor behind it."""
+    evidence = case.evidence
+    if _is_filled(evidence):
+        return DoorwayCheck(Abstention("opening_blocked", {"share": evidence.flush}))
+    measured = np.ones(len(case.points), dtype=bool)
+    rays = floor_rays(case.points, measured, case.door.opening, case.limits.free_reach_m)
+    floor = None if rays is None else rays.passed
+    hidden = _hidden(evidence, _MAX_HIDDEN)
+    # Furniture before a dark leaf may look like a leaf; nothing passes it.
+    is_crossed = evidence.through >= _CROSSED or (floor or 0) >= _CROSSED_FLOOR or hidden is not None
+    if is_crossed and sweep_leaf(case.points, case.doorway) is not None:
+        return DoorwayCheck(None, leaf_seen=True)
+    if hidden is not None:
+        return DoorwayCheck(hidden)
+    is_measured = evidence.missing <= case.limits.max_missing_share and evidence.through >= _MIN_SURFACE
+    # Things behind without their floor are seen through glass; the floor itself may be out of view.
+    if is_measured if floor is None else floor >= case.limits.min_floor_share:
+        return DoorwayCheck(None, leaf_seen=False)
+    return DoorwayCheck(_reason(evidence))
+
+
+def _is_filled(evidence: DoorwayEvidence) -> bool:
+    measured = 1 - evidence.missing - evidence.hidden
+    is_surface = evidence.flush >= max(_MIN_FILLED, _FILLED * measured) and evidence.through < _MIN_THROUGH
+    return is_surface and evidence.in_view >= 0.5
+
+
+def _hidden(evidence: DoorwayEvidence, most: float) -> Abstention | None:
+    return Abstention("door_occluded", {"share": evidence.hidden}) if evidence.hidden > most else None
+
+
+def _reason(evidence: DoorwayEvidence) -> Abstention:
+    """Return why an opening was not measured."""
+    missing = evidence.missing
+    if evidence.hole_m <= min(_NEAR_M, _NEAR_RATIO * evidence.nearest_m):
+        return Abstention("door_too_near", {"range_m": evidence.hole_m})
+    if evidence.rim_m >= max(_FAR_M, _FAR_RATIO * evidence.farthest_m):
+        return Abstention("door_out_of_range", {"range_m": evidence.rim_m})
+    if evidence.through >= _GLASS:
+        return Abstention("door_glass", {"share": evidence.through, "missing_share": missing})
+    if not evidence.has_floor_before:
+        return Abstention("door_not_measured", {"share": missing})
+    return Abstention("door_dark", {"share": missing})
+
+
+_CHECKS: dict[DoorState, Callable[[_Case], DoorwayCheck]] = {
+    DoorState.CLOSED: _check_closed,
+    DoorState.SEMI_OPEN: _check_semi_open,
+    DoorState.OPEN: _check_open,
+}
