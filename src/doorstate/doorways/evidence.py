@@ -27,7 +27,8 @@ _BEFORE_M = (0.1, 1.0)  # floor before an opening
 _FLOOR_M = 0.1  # of a point to the height of the floor
 _MIN_FLOOR_POINTS = 8
 _RANGE_QUANTILES = (0.002, 0.995)
-_FLUSH_M = 0.05  # of the depth of a cell to the middle one of the opening: noise at 3 m
+_FLUSH_M, _MAX_FLUSH_M = 0.05, 0.1  # of the depth of a cell to the middle one of the opening, ...
+_SCATTERS = 3.0  # ... or so many times the median distance of the rims' cells to theirs
 
 Cells = NDArray[np.float64]
 
@@ -87,7 +88,7 @@ def find_evidence(points: NDArray[np.float32], doorway: Doorway) -> DoorwayEvide
     return DoorwayEvidence(
         float(in_view[opening].mean()) if opening.any() else 0.0,
         *shares,
-        flush=_flush(kinds[0], elevation.relief_m[stretch, _ROWS], in_view),
+        flush=_flush(np.where(kinds[0] > 0, elevation.relief_m[stretch, _ROWS], np.nan), in_view, rims),
         rim_m=_median(rim),
         hole_m=_hole_range_m(is_missing, ranges_m),
         nearest_m=float(ranges[0]),
@@ -183,14 +184,20 @@ def _shares(
     return (parts[0], parts[1], parts[2], float(weights[empty].sum())), wide & (in_view > 0) & (seen == 0)
 
 
-def _flush(on_wall: Cells, relief_m: NDArray[np.float32], in_view: Cells) -> float:
+def _flush(relief_m: Cells, in_view: Cells, rims: list[NDArray[np.bool_]]) -> float:
     """Return the share of the cells in view whose surface is as deep as the middle one of the opening."""
-    measured = (on_wall > 0) & (in_view > 0)
-    if not measured.any():
+    depths_m = relief_m[(in_view > 0) & np.isfinite(relief_m)]
+    if len(depths_m) == 0:
         return 0.0
-    depths_m = relief_m[measured]
-    near = np.abs(depths_m - np.median(depths_m)) <= _FLUSH_M
-    return float(near.sum() / in_view.sum())
+    # The scatter of the wall itself is that of the sensor and of the doorway's direction.
+    scatters_m = [_scatter_m(relief_m[rim]) for rim in rims]
+    near_m = min(max(_FLUSH_M, _SCATTERS * max(scatters_m)), _MAX_FLUSH_M)
+    return float((np.abs(depths_m - np.median(depths_m)) <= near_m).sum() / in_view.sum())
+
+
+def _scatter_m(relief_m: Cells) -> float:
+    finite_m = relief_m[np.isfinite(relief_m)]
+    return float(np.median(np.abs(finite_m - np.median(finite_m)))) if len(finite_m) else 0.0
 
 
 def _pooled(cells: Cells, pool: int) -> Cells:

@@ -24,9 +24,10 @@ _MIN_SURFACE = 0.25  # of a closed door
 _MIN_PART = 0.15  # of a leaf that is pushed aside, as of sliding doors
 _MIN_THROUGH = 0.1
 _MAX_HIDDEN = 0.6
-_FILLED = 0.75  # of what is measured of an opening, by a surface along the wall
+_FILLED = 0.75  # of what nothing hides of an opening, by a surface along the wall
 _MIN_FILLED = 0.3  # of an opening, of which at least half is in view
-_CROSSED, _CROSSED_FLOOR = 0.05, 0.25  # of an opening with a leaf, and of the rays to the floor behind
+_CROSSED = 0.05  # of an opening of which much is missing, to look for a leaf
+_MIN_SPACE = 0.35  # of an opening in which sight lines end behind the wall, where they cannot tell more
 _GLASS = 0.05  # of an opening that is seen through, although little came back
 _NEAR_RATIO, _NEAR_M = 1.25, 1.0  # of the surroundings of a hole to the least range of the cloud, and at most
 _FAR_RATIO, _FAR_M = 0.8, 4.0  # of the wall to the largest range, and at least: rooms end at walls
@@ -103,28 +104,30 @@ def _check_semi_open(case: _Case) -> DoorwayCheck:
 def _check_open(case: _Case) -> DoorwayCheck:
     """Require an opening that is not filled, and a leaf or the floor behind it."""
     evidence = case.evidence
-    if _is_filled(evidence):
-        return DoorwayCheck(Abstention("opening_blocked", {"share": evidence.flush}))
     measured = np.ones(len(case.points), dtype=bool)
     rays = floor_rays(case.points, measured, case.door.opening, case.limits.free_reach_m)
-    floor = None if rays is None else rays.passed
+    passes = rays is not None and rays.passed >= case.limits.min_floor_share
+    if _is_filled(evidence) and not passes:
+        return DoorwayCheck(Abstention("opening_blocked", {"share": evidence.flush}))
     hidden = _hidden(evidence, _MAX_HIDDEN)
+    is_measured = evidence.missing <= case.limits.max_missing_share
     # Furniture before a dark leaf may look like a leaf; nothing passes it.
-    is_crossed = evidence.through >= _CROSSED or (floor or 0) >= _CROSSED_FLOOR or hidden is not None
-    if is_crossed and sweep_leaf(case.points, case.doorway) is not None:
+    may_have_leaf = is_measured or passes or evidence.through >= _CROSSED
+    if may_have_leaf and sweep_leaf(case.points, case.doorway) is not None:
         return DoorwayCheck(None, leaf_seen=True)
     if hidden is not None:
         return DoorwayCheck(hidden)
-    is_measured = evidence.missing <= case.limits.max_missing_share and evidence.through >= _MIN_SURFACE
-    # Things behind without their floor are seen through glass; the floor itself may be out of view.
-    if is_measured if floor is None else floor >= case.limits.min_floor_share:
+    # Seen along the wall, sight lines end on what bounds the opening. Things behind without their floor are seen
+    # through glass, but the floor may be out of view.
+    space = evidence.on_wall - evidence.flush + (evidence.through if rays is None else 0.0)
+    if passes or (is_measured and space >= _MIN_SPACE):
         return DoorwayCheck(None, leaf_seen=False)
     return DoorwayCheck(_reason(evidence))
 
 
 def _is_filled(evidence: DoorwayEvidence) -> bool:
-    measured = 1 - evidence.missing - evidence.hidden
-    is_surface = evidence.flush >= max(_MIN_FILLED, _FILLED * measured) and evidence.through < _MIN_THROUGH
+    free_of_clutter = 1 - evidence.hidden
+    is_surface = evidence.flush >= max(_MIN_FILLED, _FILLED * free_of_clutter) and evidence.through < _MIN_THROUGH
     return is_surface and evidence.in_view >= 0.5
 
 
