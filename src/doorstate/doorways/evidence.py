@@ -79,16 +79,16 @@ def find_evidence(points: NDArray[np.float32], doorway: Doorway) -> DoorwayEvide
     opening = np.abs(offsets_m[stretch]) < half_m - _EDGE_M
     rims = [side * offsets_m[stretch] > half_m for side in (-1, 1)]
     kinds = np.stack([elevation.on_wall, elevation.through, elevation.hidden])[:, stretch, _ROWS]
-    kinds = kinds.astype(np.float64)
+    lines: Cells = kinds.astype(np.float64)
     ranges_m = _ranges_m(elevation, wall, doorway.floor_z_m)[stretch, _ROWS]
-    in_view, expected = _expected(kinds.sum(axis=0), opening, rims)
-    shares, is_missing = _shares(kinds, expected, in_view)
+    in_view, expected = _expected(lines.sum(axis=0), opening, rims)
+    shares, is_missing = _shares(lines, expected, in_view)
     ranges = np.quantile(np.linalg.norm(points[:: max(1, len(points) // 4096)], axis=1), _RANGE_QUANTILES)
     rim = ranges_m[rims[0] | rims[1]]
     return DoorwayEvidence(
         float(in_view[opening].mean()) if opening.any() else 0.0,
         *shares,
-        flush=_flush(np.where(kinds[0] > 0, elevation.relief_m[stretch, _ROWS], np.nan), in_view, rims),
+        flush=_flush(np.where(lines[0] > 0, elevation.relief_m[stretch, _ROWS], np.nan), in_view, rims),
         rim_m=_median(rim),
         hole_m=_hole_range_m(is_missing, ranges_m),
         nearest_m=float(ranges[0]),

@@ -25,6 +25,7 @@ _LEAF_LEVELS, _ABOVE_LEVEL, _NUM_LEVELS = 6, 7, 8  # 0.1 to 1.9 m, and 2.2 to 2.
 _STARTS, _STOPS = 0.3, 0.95  # of the leaf's width: beyond the reveal beside the hinge
 _STEPS = 8
 _BEYOND_M = (0.15, 0.25)  # of the free edge
+_BESIDE = 2  # angles on each side of that of a wall
 _WALL_M = (-0.25, 0.15)  # beside the opening: the wall itself, which a leaf folded back lies on
 _MIN_WIDTH_M = 0.55  # of one leaf of double doors
 _RAY_TAN = 0.05  # side of the cells of the view
@@ -101,8 +102,8 @@ def _best_leaf(
     is_enough = (in_view & is_leaf).sum(axis=(-2, -1)) >= _MIN_CELLS
     is_enough &= (in_view & is_outer).sum(axis=(-2, -1)) >= _MIN_OUTER_CELLS
     shares = np.where(is_enough, np.minimum(share(is_leaf), share(is_outer)), 0.0)
-    # A wall goes on at both.
-    shares[(share(is_beyond) > 0.5) | (share(is_above) > 0.5)] = 0.0
+    goes_on = (share(is_beyond) > 0.5) | (share(is_above) > 0.5)
+    shares[_widened(goes_on)] = 0.0
     hinge, swing, number = (int(index) for index in np.unravel_index(int(shares.argmax()), shares.shape))
     if shares[hinge, swing, number] == 0:
         return None
@@ -113,6 +114,14 @@ def _best_leaf(
         "towards" if swing else "away",
         width_m,
     )
+
+
+def _widened(is_wall: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return the walls (..., angle) and the angles beside them, at which a leaf would still lie on the wall."""
+    padded = np.pad(is_wall, ((0, 0), (0, 0), (_BESIDE, _BESIDE)))
+    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * _BESIDE + 1, axis=-1)
+    widened: NDArray[np.bool_] = np.any(windows, axis=-1)
+    return widened
 
 
 def _half_m(doorway: Doorway) -> tuple[float, float]:

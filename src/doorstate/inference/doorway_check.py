@@ -26,7 +26,8 @@ _MIN_THROUGH = 0.1
 _MAX_HIDDEN = 0.6
 _FILLED = 0.75  # of what nothing hides of an opening, by a surface along the wall
 _MIN_FILLED = 0.3  # of an opening, of which at least half is in view
-_CROSSED = 0.05  # of an opening of which much is missing, to look for a leaf
+_CROSSED = 0.05  # of an opening of which much is missing
+_LEAF, _WHOLE_LEAF = 0.7, 0.95  # of the cells of a leaf in view: of an opening that is crossed, and of others
 _MIN_SPACE = 0.35  # of an opening in which sight lines end behind the wall, where they cannot tell more
 _GLASS = 0.05  # of an opening that is seen through, although little came back
 _NEAR_RATIO, _NEAR_M = 1.25, 1.0  # of the surroundings of a hole to the least range of the cloud, and at most
@@ -111,9 +112,9 @@ def _check_open(case: _Case) -> DoorwayCheck:
         return DoorwayCheck(Abstention("opening_blocked", {"share": evidence.flush}))
     hidden = _hidden(evidence, _MAX_HIDDEN)
     is_measured = evidence.missing <= case.limits.max_missing_share
-    # Furniture before a dark leaf may look like a leaf; nothing passes it.
-    may_have_leaf = is_measured or passes or evidence.through >= _CROSSED
-    if may_have_leaf and sweep_leaf(case.points, case.doorway) is not None:
+    # Furniture before a dark leaf may look like a part of a leaf; nothing passes it.
+    is_crossed = is_measured or passes or evidence.through >= _CROSSED
+    if sweep_leaf(case.points, case.doorway, min_share=_LEAF if is_crossed else _WHOLE_LEAF) is not None:
         return DoorwayCheck(None, leaf_seen=True)
     if hidden is not None:
         return DoorwayCheck(hidden)

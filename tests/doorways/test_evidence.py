@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tests of doorstate.doorways.evidence and of the sweep of leaves."""
+
+from __future__ import annotations
+
+from dataclasses import astuple
+from functools import cache
+
+import numpy as np
+import pytest
+
+from doorstate.doorways.doorway import Doorway
+from doorstate.doorways.evidence import find_evidence
+from doorstate.doorways.finder import thinned
+from doorstate.doorways.leaf_sweep import SEMI_OPEN_ANGLES_DEG, sweep_leaf
+from tests.doorways import scenes
+from tests.doorways.scenes import HandMade
+
+
+def _doorway(made: HandMade) -> Doorway:
+    true = made.doors[0]
+    return Doorway(true.x_m, true.y_m, true.yaw_deg, true.width_m, made.floor_z_m)
+
+
+@cache
+def _dark() -> tuple[np.ndarray, Doorway]:
+    made = scenes.dark_leaf()
+    return thinned(made.points), _doorway(made)
+
+
+def test_shares_of_an_opening_sum_to_one() -> None:
+    for make in (scenes.dark_leaf, scenes.glass_leaf_seen_through, scenes.lower_leaf_from_near_the_floor):
+        made = make()
+        evidence = find_evidence(thinned(made.points), _doorway(made))
+        total = evidence.on_wall + evidence.through + evidence.hidden + evidence.missing
+        assert total == pytest.approx(1.0)
+        assert 0 < evidence.in_view <= 1
+        assert 0 <= evidence.flush <= 1
+        assert evidence.nearest_m < evidence.rim_m < evidence.farthest_m
+
+
+def test_a_dark_leaf_is_missing_and_the_floor_before_it_is_there() -> None:
+    points, doorway = _dark()
+    evidence = find_evidence(points, doorway)
+    assert evidence.missing > 0.8
+    assert evidence.has_floor_before
+    assert evidence.rim_m == pytest.approx(doorway.distance_m, abs=0.5)
+
+
+def test_the_order_of_the_points_does_not_matter() -> None:
+    points, doorway = _dark()
+    shuffled = np.random.default_rng(0).permutation(points)
+    # Means of float32 depths, and samples for the ranges, depend on the order.
+    assert astuple(find_evidence(shuffled, doorway)) == pytest.approx(
+        astuple(find_evidence(points, doorway)), abs=0.05, nan_ok=True
+    )
+
+
+def test_points_far_beside_the_door_do_not_matter() -> None:
+    points, doorway = _dark()
+    near = points[np.abs(doorway.to_doorway(points)[:, 0]) < 1.3]
+    full, cut = find_evidence(points, doorway), find_evidence(near, doorway)
+    assert (cut.on_wall, cut.through, cut.hidden, cut.missing) == pytest.approx(
+        (full.on_wall, full.through, full.hidden, full.missing), abs=0.05
+    )
+
+
+def test_a_wall_without_points_has_nothing_in_view() -> None:
+    _, doorway = _dark()
+    evidence = find_evidence(np.array([[1.0, 9.0, 0.0]], np.float32), doorway)
+    assert (evidence.in_view, evidence.missing) == (0.0, 0.0)
+    assert np.isnan(evidence.rim_m)
+
+
+def _leaf(angle_deg: float, doorway: Doorway, beyond_m: float = 0.0, top_m: float = 2.0) -> np.ndarray:
+    """Return points on a leaf that opens away from the camera about the left end, and on a wall behind it."""
+    along, up = np.meshgrid(np.arange(0.02, doorway.width_m + beyond_m, 0.02), np.arange(0.02, top_m, 0.04))
+    turn = np.radians(angle_deg)
+    x = doorway.width_m / 2 - along * np.cos(turn)
+    leaf = np.stack([x, -along * np.sin(turn), up], axis=-1).reshape(-1, 3)
+    wall = np.stack(
+        np.broadcast_arrays(np.arange(-3, 3, 0.04)[:, None], -3.0, np.arange(0, 2.4, 0.04)), axis=-1
+    ).reshape(-1, 3)
+    return doorway.to_sensor(np.concatenate([leaf, wall]).astype(np.float32))
+
+
+@pytest.mark.parametrize("angle_deg", [70.0, 90.0, 110.0])
+def test_a_leaf_is_found_at_its_angle(angle_deg: float) -> None:
+    doorway = Doorway(2.5, -0.4, 90.0, 0.9, -1.0)
+    leaf = sweep_leaf(_leaf(angle_deg, doorway), doorway)
+    assert leaf is not None
+    assert (leaf.hinge, leaf.swing, leaf.width_m) == ("left", "away", 0.9)
+    assert leaf.angle_deg == pytest.approx(angle_deg, abs=5)
+    assert leaf.share > 0.9
+
+
+def test_a_leaf_that_is_half_open_is_none_of_an_open_door() -> None:
+    doorway = Doorway(2.5, -0.4, 90.0, 0.9, -1.0)
+    assert sweep_leaf(_leaf(40.0, doorway), doorway) is None
+    half_open = sweep_leaf(_leaf(40.0, doorway), doorway, SEMI_OPEN_ANGLES_DEG)
+    assert half_open is not None
+    assert half_open.angle_deg == pytest.approx(40, abs=5)
+
+
+def test_a_wall_that_goes_on_is_no_leaf() -> None:
+    doorway = Doorway(2.5, -0.4, 90.0, 0.9, -1.0)
+    assert sweep_leaf(_leaf(90.0, doorway, beyond_m=1.0), doorway) is None
+    assert sweep_leaf(_leaf(90.0, doorway, top_m=2.5), doorway) is None

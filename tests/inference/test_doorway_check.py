@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tests of doorstate.inference.doorway_check on scenes made by hand, and on frames of Gazebo with parts lost."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from doorstate.clouds.measured import is_measured
+from doorstate.inference.door import Door
+from doorstate.inference.gate import DEFAULT_GATE, DoorwayCheck
+from doorstate.io.depth import depth_to_points
+from doorstate.simulation.camera import CAMERAS
+from doorstate.simulation.frames import level
+from doorstate.types import DoorState, Points
+from tests.doorways import scenes
+from tests.doorways.scenes import HandMade
+
+_GAZEBO = Path(__file__).resolve().parents[1] / "fixtures" / "gazebo"
+_OPEN_WITHOUT_LEAF = "02_open"  # seen along its wall
+
+
+def _check(made: HandMade, state: DoorState, cloud: Points | None = None) -> DoorwayCheck:
+    true = made.doors[0]
+    door = Door(true.x_m, true.y_m, true.yaw_deg, true.width_m, state, floor_z_m=made.floor_z_m)
+    return DEFAULT_GATE.check_doorway(made.points if cloud is None else cloud, door)
+
+
+def _code(check: DoorwayCheck) -> str | None:
+    return None if check.abstention is None else check.abstention.code
+
+
+@cache
+def _frames() -> list[tuple[str, Points, Door]]:
+    frames = []
+    with np.load(_GAZEBO / "depth.npz") as stored:
+        depths = stored["depth"]
+    for scene, depth_m in zip(
+        json.loads((_GAZEBO / "scenes.json").read_text(encoding="utf-8")), depths, strict=True
+    ):
+        camera = scene["camera"]
+        cos, sin = math.cos(camera["yaw"]), math.sin(camera["yaw"])
+        points = depth_to_points(depth_m, CAMERAS["xtion-gazebo"].intrinsics())
+        door = Door(
+            -camera["x"] * cos - camera["y"] * sin,
+            camera["x"] * sin - camera["y"] * cos,
+            math.degrees(-camera["yaw"]),
+            0.9,
+            DoorState(scene["state"]),
+            floor_z_m=-camera["z"],
+        )
+        frames.append((scene["name"], level(points, camera["pitch"]), door))
+    return frames
+
+
+def _with_loss(points: Points, rng: np.random.Generator, kind: str) -> Points:
+    if kind == "random":
+        return np.where(rng.random(points.shape[:2])[..., None] < 0.75, np.float32(np.nan), points)
+    if kind == "flat":
+        return points[is_measured(points) & (rng.random(points.shape[:2]) < 0.25)]
+    height, width = (round(size * math.sqrt(0.1)) for size in points.shape[:2])
+    row, column = (int(rng.integers(points.shape[axis] - size)) for axis, size in enumerate((height, width)))
+    lost = points.copy()
+    lost[row : row + height, column : column + width] = np.nan
+    return lost
+
+
+@pytest.mark.parametrize("state", [DoorState.OPEN, DoorState.CLOSED, DoorState.SEMI_OPEN])
+def test_a_dark_leaf_is_unknown_in_any_state(state: DoorState) -> None:
+    check = _check(scenes.dark_leaf(), state)
+    assert _code(check) == "door_dark"
+    assert check.abstention is not None
+    assert check.abstention.values["share"] > 0.7
+    assert str(check.abstention)
+
+
+def test_a_leaf_of_glass_is_never_a_seen_leaf() -> None:
+    assert _check(scenes.glass_leaf_seen_through(), DoorState.OPEN) == DoorwayCheck(None, leaf_seen=False)
+    assert _code(_check(scenes.glass_leaf_seen_through(), DoorState.CLOSED)) == "door_glass"
+
+
+def test_a_floor_that_goes_on_behind_is_an_open_door_without_its_lintel() -> None:
+    assert _code(_check(scenes.open_doorway_without_lintel(), DoorState.OPEN)) is None
+
+
+@pytest.mark.parametrize(
+    ("make", "state"),
+    [
+        (scenes.closed_door_beside_free_corridor, DoorState.CLOSED),
+        (scenes.closed_door_in_a_recess_beside_a_fridge, DoorState.CLOSED),
+        (scenes.doorway_at_the_edge_of_a_rolled_view, DoorState.CLOSED),
+        (scenes.lower_leaf_from_near_the_floor, DoorState.SEMI_OPEN),
+        (scenes.leaf_square_in_the_room, DoorState.OPEN),
+    ],
+)
+def test_true_states_are_confirmed(make: Callable[[], HandMade], state: DoorState) -> None:
+    assert _code(_check(make(), state)) is None
+
+
+@pytest.mark.parametrize(
+    "make", [scenes.closed_door_beside_free_corridor, scenes.closed_door_in_a_recess_beside_a_fridge]
+)
+def test_closed_doors_that_are_called_open_are_refused(make: Callable[[], HandMade]) -> None:
+    assert _code(_check(make(), DoorState.OPEN)) is not None
+
+
+def test_something_that_stands_before_a_door_occludes_it() -> None:
+    made = scenes.glass_leaf_seen_through()
+    true = made.doors[0]
+    view = made.points.copy()
+    across = np.abs(view[..., 1] / view[..., 0] - true.y_m / true.x_m) < 0.35
+    view[across] *= np.float32(1.3) / view[across][:, :1]
+    check = _check(made, DoorState.CLOSED, view)
+    assert _code(check) == "door_occluded"
+    assert check.abstention is not None
+    assert check.abstention.values["share"] > 0.6
+
+
+def test_a_door_out_of_view_is_refused() -> None:
+    made = scenes.dark_leaf()
+    true = made.doors[0]
+    door = Door(true.x_m, true.y_m + 6, true.yaw_deg, true.width_m, DoorState.CLOSED, floor_z_m=made.floor_z_m)
+    assert _code(DEFAULT_GATE.check_doorway(made.points, door)) == "door_out_of_view"
+
+
+@pytest.mark.parametrize("kind", ["none", "rectangle", "random", "flat"])
+def test_losses_do_not_silence_measured_doors(kind: str) -> None:
+    rng = np.random.default_rng(0)
+    refused, unseen = [], []
+    for name, points, door in _frames():
+        check = DEFAULT_GATE.check_doorway(points if kind == "none" else _with_loss(points, rng, kind), door)
+        refused += [name] if check.abstention is not None else []
+        unseen += [name] if door.state is DoorState.OPEN and not check.leaf_seen else []
+    assert set(refused) <= {_OPEN_WITHOUT_LEAF}
+    assert len(unseen) <= 3
+
+
+def test_closed_doors_of_gazebo_are_never_confirmed_as_open() -> None:
+    for _, points, door in _frames():
+        if door.state is DoorState.CLOSED:
+            said = Door(door.x_m, door.y_m, door.yaw_deg, 0.9, DoorState.OPEN, floor_z_m=door.floor_z_m)
+            assert _code(DEFAULT_GATE.check_doorway(points, said)) == "opening_blocked"
+
+
+def test_a_door_without_state_or_points_is_not_checked() -> None:
+    door = Door(2.0, 0.0, 90.0, 0.9, None, floor_z_m=-1.0)
+    assert DEFAULT_GATE.check_doorway(np.ones((9, 3), np.float32), door) == DoorwayCheck(None)
