@@ -125,7 +125,9 @@ def test_something_that_stands_before_a_door_occludes_it() -> None:
 def test_a_door_out_of_view_is_refused() -> None:
     made = scenes.dark_leaf()
     true = made.doors[0]
-    door = Door(true.x_m, true.y_m + 6, true.yaw_deg, true.width_m, DoorState.CLOSED, floor_z_m=made.floor_z_m)
+    door = Door(
+        true.x_m, true.y_m + 6, true.yaw_deg, true.width_m, DoorState.CLOSED, floor_z_m=made.floor_z_m
+    )
     assert _code(DEFAULT_GATE.check_doorway(made.points, door)) == "door_out_of_view"
 
 

@@ -155,7 +155,9 @@ def _row_density(rim: Cells) -> Cells:
     padded = np.pad(rim, ((0, 0), (1, 1)), mode="edge")
     about = (padded[:, :-2] + padded[:, 1:-1] + padded[:, 2:]) / 3
     filled = about > 0
-    density: Cells = np.where(filled.sum(axis=0) >= 2, about.sum(axis=0) / np.maximum(filled.sum(axis=0), 1), 0)
+    density: Cells = np.where(
+        filled.sum(axis=0) >= 2, about.sum(axis=0) / np.maximum(filled.sum(axis=0), 1), 0
+    )
     return density
 
 

@@ -151,7 +151,9 @@ def _occupied(points: NDArray[np.float32], doorway: Doorway) -> NDArray[np.bool_
     return occupied
 
 
-def _look_up(occupied: NDArray[np.bool_], x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _look_up(
+    occupied: NDArray[np.bool_], x: NDArray[np.float64], y: NDArray[np.float64]
+) -> NDArray[np.bool_]:
     """Return the occupied levels (..., level) at places in plan view."""
     column = ((x / _SIDE_M) + (occupied.shape[0] - 1) / 2).astype(np.int64)
     row = ((y / _SIDE_M) + (occupied.shape[1] - 1) / 2).astype(np.int64)

@@ -128,7 +128,9 @@ def _check_open(case: _Case) -> DoorwayCheck:
 
 def _is_filled(evidence: DoorwayEvidence) -> bool:
     free_of_clutter = 1 - evidence.hidden
-    is_surface = evidence.flush >= max(_MIN_FILLED, _FILLED * free_of_clutter) and evidence.through < _MIN_THROUGH
+    is_surface = (
+        evidence.flush >= max(_MIN_FILLED, _FILLED * free_of_clutter) and evidence.through < _MIN_THROUGH
+    )
     return is_surface and evidence.in_view >= 0.5
 
 
