@@ -69,6 +69,22 @@ def test_missing_pixels_are_not_cropped(frames: list[Frame], doorway: Doorway) -
         crop_cloud(cloud, Doorway(-1.3, 0.0, 90.0, 0.9, -0.5), SPEC)
 
 
+def test_a_small_hole_in_a_wall_is_filled(frames: list[Frame], doorway: Doorway) -> None:
+    spec = CropSpec(num_points=1024)
+    cloud = frames[0].points.copy()
+    x, _, z = np.moveaxis(doorway.to_doorway(cloud), -1, 0)
+    hole = (x > -0.12) & (x < 0.07) & (z > 1.18) & (z < 1.42)
+    cloud[hole] = np.nan
+    points, rows = crop_cloud(cloud, doorway, spec)
+    x, _, z = points.T
+    filled = (x > -0.1) & (x < 0.05) & (z > 1.2) & (z < 1.4)
+    assert filled.any()
+    assert np.isfinite(cloud.reshape(-1, 3)[rows]).all()
+    gaps_m = np.linalg.norm(doorway.to_sensor(points) - cloud.reshape(-1, 3)[rows], axis=1)
+    assert gaps_m[filled].max() < 0.2
+    assert gaps_m[~filled].max() < 0.15
+
+
 def test_a_place_without_points_is_refused(frames: list[Frame]) -> None:
     for cloud in (frames[0].points, frames[0].points.reshape(-1, 3)):
         with pytest.raises(TooFewPointsError):

@@ -21,6 +21,7 @@ from doorstate.clouds.preparation import (
 from doorstate.clouds.samplers import Sampler
 from doorstate.clouds.thinning import CELLS_PER_POINT, thinned_points
 from doorstate.doorways.doorway import Doorway
+from doorstate.doorways.small_holes import fill_small_holes
 from doorstate.types import Indices, Points
 
 CROP_POINTS = 1024
@@ -66,6 +67,8 @@ def crop_cloud(
 
     They are sampled from some of the points in the box: of an image from every second, third, ... row and column,
     at least 6 pixels for each point, and of a flat cloud from one point in each cell of a grid.
+    Holes of at most 0.2 m are filled where the surface around them is one plane; such points have the row of the
+    measured point nearest to them.
 
     Args:
         cloud: (N, 3) or organized (H, W, 3) metres, level sensor frame, without outliers; NaN, infinite or (0, 0, 0)
@@ -83,6 +86,10 @@ def crop_cloud(
         rows, points = _inside(cloud, doorway, spec)
         kept = thinned_points(points, CELLS_PER_POINT * spec.num_points)
         rows, points = rows[kept], points[kept]
+    filling = fill_small_holes(points, doorway.to_doorway(np.zeros(3, np.float32)))
+    if len(filling.points):
+        points = np.concatenate([points, filling.points])
+        rows = np.concatenate([rows, rows[filling.nearest]])
     least = min(spec.num_points, MIN_POINTS)
     if len(points) < least:
         raise too_few_points(f"{len(points)} measured around the doorway")

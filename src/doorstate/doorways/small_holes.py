@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Small holes of a cloud about a doorway: lost pixels, which are filled where the surface around is one plane."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from doorstate.doorways.elevation import COLUMN_M, RELIEF_M, ROW_M
+from doorstate.types import Indices, Points
+
+_MAX_COLUMNS, _MAX_ROWS = round(0.2 / COLUMN_M), round(0.2 / ROW_M)
+_MIN_CELLS = 2  # narrower holes lie between the points of a crop anyway
+_MIN_DENSITY = (
+    6.0  # mean points of the cells around: two cells in a row are empty by chance in 1 of 100,000 places
+)
+_PLANE_M = 0.02  # of every point around to the plane
+_PER_ROW = 2  # points of a filled cell, one above the other
+
+
+class Filling(NamedTuple):
+    """Points on the surface around small holes."""
+
+    points: Points  # (K, 3)
+    nearest: Indices  # (K,) row of the measured point nearest to each
+
+
+class _Grid(NamedTuple):
+    """Cells (columns, rows) of the wall's plane, and the points whose sight lines cross them, in their order."""
+
+    low_m: NDArray[np.float64]  # (2,) corner
+    counts: NDArray[np.int64]
+    rows: Indices  # points by cell
+    starts: Indices  # of each cell in `rows`
+
+    def points_of(self, cells: list[tuple[int, int]]) -> Indices:
+        """Return the points of some cells."""
+        number = [column * self.counts.shape[1] + row for column, row in cells]
+        return np.concatenate([self.rows[self.starts[k] : self.starts[k + 1]] for k in number])
+
+
+def fill_small_holes(points: Points, camera_m: Points) -> Filling:
+    """Return points for the holes, at most 0.2 m across, whose surroundings all lie on one plane.
+
+    Args:
+        points: (N, 3) measured points in the doorway's frame.
+        camera_m: (3,) place of the camera in it.
+    """
+    grid = _grid(points, camera_m.astype(np.float64))
+    none = Filling(np.empty((0, 3), np.float32), np.empty(0, np.int64))
+    if grid is None:
+        return none
+    parts = [
+        part
+        for hole in _small_holes(grid.counts)
+        if (part := _fill(hole, grid, points, camera_m.astype(np.float64))) is not None
+    ]
+    if not parts:
+        return none
+    return Filling(
+        np.concatenate([part.points for part in parts]), np.concatenate([part.nearest for part in parts])
+    )
+
+
+def _grid(points: Points, camera_m: NDArray[np.float64]) -> _Grid | None:
+    towards_m = camera_m[1] - points[:, 1].astype(np.float64)
+    ahead = np.flatnonzero(towards_m > 1e-3) if camera_m[1] > 0 else np.empty(0, np.int64)
+    if len(ahead) == 0:
+        return None
+    share = camera_m[1] / towards_m[ahead]
+    crossings = (camera_m + (points[ahead] - camera_m) * share[:, None])[:, [0, 2]]
+    low_m = np.array([-1.5, 0.0])
+    cell = np.floor((crossings - low_m) / (COLUMN_M, ROW_M)).astype(np.int64)
+    shape = (round(3.0 / COLUMN_M), round(2.4 / ROW_M))
+    inside = ((cell >= 0) & (cell < shape)).all(axis=1)
+    number = cell[inside, 0] * shape[1] + cell[inside, 1]
+    order = np.argsort(number, kind="stable")
+    counts = np.bincount(number, minlength=shape[0] * shape[1])
+    starts = np.concatenate([[0], np.cumsum(counts)])
+    return _Grid(low_m, counts.reshape(shape), ahead[inside][order], starts)
+
+
+def _small_holes(counts: NDArray[np.int64]) -> list[list[tuple[int, int]]]:
+    """Return the cells of each hole between filled cells that is small in both directions."""
+    empty = counts == 0
+    small = _short_runs(empty, _MAX_COLUMNS) & _short_runs(empty.T, _MAX_ROWS).T
+    left = {(int(column), int(row)) for column, row in np.argwhere(small)}
+    holes = []
+    while left:
+        hole, front = [], [left.pop()]
+        while front:
+            column, row = front.pop()
+            hole.append((column, row))
+            for near in ((column - 1, row), (column + 1, row), (column, row - 1), (column, row + 1)):
+                if near in left:
+                    left.remove(near)
+                    front.append(near)
+        if len(hole) >= _MIN_CELLS:
+            holes.append(sorted(hole))
+    return sorted(holes)
+
+
+def _short_runs(empty: NDArray[np.bool_], most: int) -> NDArray[np.bool_]:
+    """Return the cells in runs of at most so many empty cells along the first axis, with filled cells at both ends."""
+    short = np.zeros_like(empty)
+    for length in range(1, most + 1):
+        starts = len(empty) - length - 1  # places of the filled cell before a run
+        run = ~empty[:starts] & ~empty[length + 1 :]
+        for step in range(1, length + 1):
+            run &= empty[step : starts + step]
+        for step in range(1, length + 1):
+            short[step : starts + step] |= run
+    return short
+
+
+def _fill(
+    hole: list[tuple[int, int]], grid: _Grid, points: Points, camera_m: NDArray[np.float64]
+) -> Filling | None:
+    """Return the points of one hole, or None if what surrounds it is not measured all around or is no plane."""
+    around = sorted({(c + i, r + j) for c, r in hole for i in (-1, 0, 1) for j in (-1, 0, 1)} - set(hole))
+    counts = np.array([grid.counts[cell] for cell in around])
+    if (counts == 0).any() or counts.mean() < _MIN_DENSITY:
+        return None
+    rows = grid.points_of(around)
+    surface = points[rows].astype(np.float64)
+    if (np.abs(surface[:, 1]) > RELIEF_M).any():
+        return None
+    middle = surface.mean(axis=0)
+    normal = np.linalg.svd(surface - middle, full_matrices=False)[2][2]
+    if (np.abs((surface - middle) @ normal) > _PLANE_M).any():
+        return None
+    steps = (np.arange(_PER_ROW) + 0.5) / _PER_ROW
+    cells = np.array([(column + 0.5, row + step) for column, row in hole for step in steps])
+    places = grid.low_m + cells * (COLUMN_M, ROW_M)
+    rays = np.stack([places[:, 0], np.zeros(len(places)), places[:, 1]], axis=1) - camera_m
+    filled = camera_m + rays * (((middle - camera_m) @ normal) / (rays @ normal))[:, None]
+    gaps = ((filled[:, None] - surface[None]) ** 2).sum(axis=2)
+    return Filling(filled.astype(np.float32), rows[gaps.argmin(axis=1)])
