@@ -13,8 +13,8 @@ from doorstate.types import Indices, Points
 
 _MAX_COLUMNS, _MAX_ROWS = round(0.2 / COLUMN_M), round(0.2 / ROW_M)
 _MIN_CELLS = 2  # narrower holes lie between the points of a crop anyway
-_MIN_DENSITY = (
-    6.0  # mean points of the cells around: two cells in a row are empty by chance in 1 of 100,000 places
+_MIN_LOST = (
+    14.0  # points that the cells around let expect in a hole; by chance one of a million places has none
 )
 _PLANE_M = 0.02  # of every point around to the plane
 _PER_ROW = 2  # points of a filled cell, one above the other
@@ -121,7 +121,7 @@ def _fill(
     """Return the points of one hole, or None if what surrounds it is not measured all around or is no plane."""
     around = sorted({(c + i, r + j) for c, r in hole for i in (-1, 0, 1) for j in (-1, 0, 1)} - set(hole))
     counts = np.array([grid.counts[cell] for cell in around])
-    if (counts == 0).any() or counts.mean() < _MIN_DENSITY:
+    if (counts == 0).any() or counts.mean() * len(hole) < _MIN_LOST:
         return None
     rows = grid.points_of(around)
     surface = points[rows].astype(np.float64)
