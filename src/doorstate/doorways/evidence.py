@@ -22,6 +22,7 @@ _RIM_M = 0.6  # stretch of wall on each side
 _EDGE_M = 0.1  # of the opening, which its frame may hide
 _ROWS = slice(round(0.1 / ROW_M), round(2.0 / ROW_M))  # above thresholds, below lintels
 _POOLS = (1, 2, 3)  # cells that are taken together, in both directions, where points are few
+_MIN_FILLED = 0.9  # of the cells of each rim: seen along the wall, whole columns lie between two sight lines
 _MIN_EXPECTED = 6.0  # sight lines of a cell: one in 400 such cells is empty by chance
 _BEFORE_M = (0.1, 1.0)  # floor before an opening
 _FLOOR_M = 0.1  # of a point to the height of the floor
@@ -82,13 +83,14 @@ def find_evidence(points: NDArray[np.float32], doorway: Doorway) -> DoorwayEvide
     lines: Cells = kinds.astype(np.float64)
     ranges_m = _ranges_m(elevation, wall, doorway.floor_z_m)[stretch, _ROWS]
     in_view, expected = _expected(lines.sum(axis=0), opening, rims)
-    shares, is_missing = _shares(lines, expected, in_view)
+    shares, is_missing = _shares(lines, expected, in_view, rims)
     ranges = np.quantile(np.linalg.norm(points[:: max(1, len(points) // 4096)], axis=1), _RANGE_QUANTILES)
     rim = ranges_m[rims[0] | rims[1]]
     return DoorwayEvidence(
         float(in_view[opening].mean()) if opening.any() else 0.0,
         *shares,
-        flush=_flush(np.where(lines[0] > 0, elevation.relief_m[stretch, _ROWS], np.nan), in_view, rims),
+        flush=shares[0]
+        * _flush(np.where(lines[0] > 0, elevation.relief_m[stretch, _ROWS], np.nan), in_view, rims),
         rim_m=_median(rim),
         hole_m=_hole_range_m(is_missing, ranges_m),
         nearest_m=float(ranges[0]),
@@ -162,7 +164,7 @@ def _row_density(rim: Cells) -> Cells:
 
 
 def _shares(
-    kinds: Cells, expected: Cells, in_view: Cells
+    kinds: Cells, expected: Cells, in_view: Cells, rims: list[NDArray[np.bool_]]
 ) -> tuple[tuple[float, float, float, float], NDArray[np.bool_]]:
     """Return the shares on the wall, through, hidden and missing, and the missing cells (columns, rows)."""
     is_missing = np.zeros(in_view.shape, dtype=bool)
@@ -172,7 +174,10 @@ def _shares(
     for pool in _POOLS:
         lines, cells = _pooled(expected * in_view, pool), _pooled(in_view, pool)
         counted = (cells >= 0.5 * pool**2) & (lines >= _MIN_EXPECTED)
-        if counted.sum() >= 0.5 * (cells >= 0.5 * pool**2).sum() and counted.any():
+        is_enough = counted.any() and counted.sum() >= 0.5 * (cells >= 0.5 * pool**2).sum()
+        if is_enough and all(
+            _filled_share(seen[rim][:, in_view.any(axis=0)], pool) >= _MIN_FILLED for rim in rims
+        ):
             break
     else:
         counted = cells > 0  # too few points to tell a hole from chance in each cell
@@ -186,15 +191,21 @@ def _shares(
     return (parts[0], parts[1], parts[2], float(weights[empty].sum())), wide & (in_view > 0) & (seen == 0)
 
 
+def _filled_share(seen: Cells, pool: int) -> float:
+    """Return the share of the pooled cells of a rim that were measured; 1 where none were, as out of view."""
+    filled = _pooled(seen, pool) > 0
+    return float(filled.mean()) if filled.any() else 1.0
+
+
 def _flush(relief_m: Cells, in_view: Cells, rims: list[NDArray[np.bool_]]) -> float:
-    """Return the share of the cells in view whose surface is as deep as the middle one of the opening."""
+    """Return the share of the cells with a surface in which it is as deep as the middle one of the opening."""
     depths_m = relief_m[(in_view > 0) & np.isfinite(relief_m)]
     if len(depths_m) == 0:
         return 0.0
     # The scatter of the wall itself is that of the sensor and of the doorway's direction.
     scatters_m = [_scatter_m(relief_m[rim]) for rim in rims]
     near_m = min(max(_FLUSH_M, _SCATTERS * max(scatters_m)), _MAX_FLUSH_M)
-    return float((np.abs(depths_m - np.median(depths_m)) <= near_m).sum() / in_view.sum())
+    return float((np.abs(depths_m - np.median(depths_m)) <= near_m).mean())
 
 
 def _scatter_m(relief_m: Cells) -> float:

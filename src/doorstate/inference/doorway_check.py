@@ -18,16 +18,18 @@ from doorstate.inference.door import Door
 from doorstate.inference.seen_through import floor_rays
 from doorstate.types import DoorState, Points
 
-_MAX_POINTS = 20_000  # of a cloud: a dozen for each cell of a door 2.5 m away
+_MAX_POINTS = 12_000  # of a cloud: eight for each cell of a door 2.5 m away
 _MIN_IN_VIEW = 0.06  # of an opening
 _MIN_SURFACE = 0.25  # of a closed door
 _MIN_PART = 0.15  # of a leaf that is pushed aside, as of sliding doors
 _MIN_THROUGH = 0.1
 _MAX_HIDDEN = 0.6
 _FILLED = 0.75  # of what nothing hides of an opening, by a surface along the wall
+_BLOCKED = 0.5  # of an opening by surfaces, where nothing else confirms that it is open
 _MIN_FILLED = 0.3  # of an opening, of which at least half is in view
 _CROSSED = 0.05  # of an opening of which much is missing
 _LEAF, _WHOLE_LEAF = 0.7, 0.95  # of the cells of a leaf in view: of an opening that is crossed, and of others
+_MIN_SEEN_FLOOR = 0.7  # of the rays to it: a pane in a dark leaf shows its farther part only
 _MIN_SPACE = 0.35  # of an opening in which sight lines end behind the wall, where they cannot tell more
 _GLASS = 0.05  # of an opening that is seen through, although little came back
 _NEAR_RATIO, _NEAR_M = 1.25, 1.0  # of the surroundings of a hole to the least range of the cloud, and at most
@@ -107,7 +109,7 @@ def _check_open(case: _Case) -> DoorwayCheck:
     evidence = case.evidence
     measured = np.ones(len(case.points), dtype=bool)
     rays = floor_rays(case.points, measured, case.door.opening, case.limits.free_reach_m)
-    passes = rays is not None and rays.passed >= case.limits.min_floor_share
+    passes = rays is not None and rays.passed >= case.limits.min_floor_share and rays.seen >= _MIN_SEEN_FLOOR
     if _is_filled(evidence) and not passes:
         return DoorwayCheck(Abstention("opening_blocked", {"share": evidence.flush}))
     hidden = _hidden(evidence, _MAX_HIDDEN)
@@ -123,6 +125,8 @@ def _check_open(case: _Case) -> DoorwayCheck:
     space = evidence.on_wall - evidence.flush + (evidence.through if rays is None else 0.0)
     if passes or (is_measured and space >= _MIN_SPACE):
         return DoorwayCheck(None, leaf_seen=False)
+    if evidence.on_wall >= _BLOCKED:
+        return DoorwayCheck(Abstention("opening_blocked", {"share": evidence.on_wall}))
     return DoorwayCheck(_reason(evidence))
 
 

@@ -22,7 +22,7 @@ _BEHIND_M = np.arange(0.1, 2.5, 0.1)  # along the ray
 _DEPTH_SPOTS = 9  # the nearest in view of each line: as far as a leaf reaches
 _MIN_REACH_M = 0.5  # behind the opening, however far away it is
 _BEFORE_M = 0.3  # what stands as far before the wall says nothing of the opening
-_PASSED_M = 0.15  # a leaf that lies deeper than its wall is nearer
+_PASSED_M = 0.3  # behind the face of the wall; leaves in thick walls and sliding ones behind them are nearer
 _MAX_GAP = 1.5  # of view_cells.nearest_measured
 _MAX_POINTS = 4096  # about the opening
 _MIN_SPOTS = 12
@@ -72,7 +72,7 @@ class FloorRays(NamedTuple):
     """Rays to the floor behind an opening that nothing before the wall hides."""
 
     seen: float  # share that came back
-    passed: float  # share that came back from behind the opening
+    passed: float  # share, of those to floor that lies well behind it, that came back from there
 
 
 def seen_share(cloud: Points, measured: NDArray[np.bool_], opening: Opening, reach_m: float) -> float | None:
@@ -122,8 +122,9 @@ def floor_rays(
     before = is_measured & (behind_m < -_BEFORE_M)
     if (~before).sum() < _MIN_SPOTS:
         return None
-    passed = is_measured & (behind_m > _PASSED_M)
-    return FloorRays(float(is_measured[~before].mean()), float(passed[~before].mean()))
+    beyond = ~before & (_behind_m(opening, spots[in_view]) > _PASSED_M)
+    passed = float((is_measured & (behind_m > _PASSED_M))[beyond].mean()) if beyond.any() else 0.0
+    return FloorRays(float(is_measured[~before].mean()), passed)
 
 
 def _ends(outline_m: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
