@@ -4,12 +4,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from doorstate.doorways.cues import Cues
 from doorstate.types import Points
 
 
@@ -28,7 +27,6 @@ class Doorway:
     width_m: float
     floor_z_m: float
     score: float = 0.0  # higher is more like a doorway
-    cues: Cues = field(default=Cues())
 
     @property
     def distance_m(self) -> float:

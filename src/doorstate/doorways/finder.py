@@ -13,7 +13,6 @@ from pydantic import Field
 from doorstate._models import FrozenModel
 from doorstate.clouds.measured import is_measured
 from doorstate.doorways.column_scorer import ColumnScores, score_columns
-from doorstate.doorways.cues import find_cues
 from doorstate.doorways.doorway import Doorway
 from doorstate.doorways.elevation import COLUMN_M, Elevation, wall_elevation
 from doorstate.doorways.plan_lines import Floats, angle_deg
@@ -108,7 +107,6 @@ def _on_wall(wall: Wall, elevation: Elevation, floor_m: float, settings: FinderS
             width_m=width_m,
             floor_z_m=floor_m,
             score=float(scores.middles.probability[peak]),
-            cues=find_cues(elevation, right_m, left_m),
         )
 
 
