@@ -10,8 +10,9 @@ from typing import Literal, NamedTuple
 
 from doorstate.doorways.remoteness import remoteness_m
 from doorstate.inference.abstention import Abstention
+from doorstate.inference.answer import StateAnswer
 from doorstate.inference.seen_through import Opening
-from doorstate.types import ABSTAINED, DoorState
+from doorstate.types import DoorState
 
 Hinge = Literal["left", "right"]
 
@@ -28,7 +29,7 @@ class DoorFrame(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Door:
+class Door(StateAnswer):
     """One door in a cloud, in the level sensor frame, or a candidate that is refused.
 
     Numbers that the method does not estimate are None. Without a state there is no angle, hinge and passage; place and
@@ -70,11 +71,6 @@ class Door:
     score: float | None = None
 
     @property
-    def label(self) -> str:
-        """Name of the state, or `abstained`."""
-        return str(self.state or ABSTAINED)
-
-    @property
     def frame(self) -> DoorFrame:
         """Pose of the door frame."""
         return DoorFrame(self.x_m, self.y_m, self.yaw_deg)
@@ -98,21 +94,6 @@ class Door:
     def remoteness_m(self) -> float:
         """Distance, longer for doors beside the view's axis (`doorways.remoteness`)."""
         return remoteness_m(self.x_m, self.y_m)
-
-    @property
-    def probabilities(self) -> dict[str, float] | None:
-        """Probabilities by state; None without a state."""
-        return None if self.state is None or self.raw_probabilities is None else dict(self.raw_probabilities)
-
-    @property
-    def probability(self) -> float | None:
-        """Probability of the state; None where there are no `probabilities`."""
-        return None if self.state is None or self.probabilities is None else self.probabilities[self.state]
-
-    @property
-    def reason(self) -> str:
-        """Sentence of the abstention; empty with a state."""
-        return "" if self.abstention is None else str(self.abstention)
 
     def refuse(self, abstention: Abstention) -> Door:
         """Return the door without its state, leaf and passage; place and width stay."""

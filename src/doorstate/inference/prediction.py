@@ -10,16 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from doorstate.inference.abstention import Abstention
+from doorstate.inference.answer import StateAnswer
 from doorstate.inference.door import Door, DoorFrame, Hinge
 from doorstate.inference.seen_through import Opening
 from doorstate.inference.tilt import Tilt
 from doorstate.inference.validity import are_probabilities
 from doorstate.rules.base import Detection
-from doorstate.types import ABSTAINED, STATES, DoorState
+from doorstate.types import STATES, DoorState
 
 
 @dataclass(frozen=True)
-class Prediction:
+class Prediction(StateAnswer):
     """State of the door in one cloud, or the reason why there is none.
 
     Numbers that the method does not estimate are None. Without a state there are no probabilities and no geometry.
@@ -47,21 +48,6 @@ class Prediction:
     doors: tuple[Door, ...] = ()  # in the level sensor frame, the one of the fields above first
     refused: tuple[Door, ...] = field(default=(), compare=False, repr=False)  # candidates that are no doors
     tilt: Tilt | None = None  # of a camera whose cloud was turned level; None: the cloud was taken as it is
-
-    @property
-    def label(self) -> str:
-        """Name of the state, or `abstained`."""
-        return str(self.state or ABSTAINED)
-
-    @property
-    def probabilities(self) -> dict[str, float] | None:
-        """Probabilities by state; None without a state, and for a rule, which does not estimate any."""
-        return None if self.state is None or self.raw_probabilities is None else dict(self.raw_probabilities)
-
-    @property
-    def probability(self) -> float | None:
-        """Probability of the state; None where there are no `probabilities`."""
-        return None if self.state is None or self.probabilities is None else self.probabilities[self.state]
 
     @property
     def opening(self) -> Opening | None:
@@ -104,11 +90,6 @@ class Prediction:
             return False
         given = self.raw_probabilities
         return given is None or (given.keys() == set(STATES) and are_probabilities(list(given.values())))
-
-    @property
-    def reason(self) -> str:
-        """Sentence of the abstention; empty with a state."""
-        return "" if self.abstention is None else str(self.abstention)
 
     def refuse(self, abstention: Abstention) -> Prediction:
         """Return the prediction without its state and geometry."""

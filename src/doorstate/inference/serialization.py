@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from doorstate.errors import TooFewPointsError, WriteParameter, python_parameter
 
 if TYPE_CHECKING:
+    from doorstate.inference.answer import StateAnswer
     from doorstate.inference.door import Door
     from doorstate.inference.prediction import Prediction
     from doorstate.io.sensor_pose import SensorPose
@@ -47,7 +48,7 @@ def door_to_dict(door: Door, parameter: WriteParameter = python_parameter) -> di
     return _state(door) | _reason(door, parameter) | _given(DOOR_FIELDS, door)
 
 
-def _state(answer: Door | Prediction) -> dict[str, Any]:
+def _state(answer: StateAnswer) -> dict[str, Any]:
     record: dict[str, Any] = {"state": None if answer.state is None else str(answer.state)}
     if answer.raw_probabilities is not None:
         name = "raw_probabilities" if answer.state is None else "probabilities"
@@ -55,7 +56,7 @@ def _state(answer: Door | Prediction) -> dict[str, Any]:
     return record
 
 
-def _reason(answer: Door | Prediction, parameter: WriteParameter) -> dict[str, Any]:
+def _reason(answer: StateAnswer, parameter: WriteParameter) -> dict[str, Any]:
     return {} if answer.abstention is None else {"reason": answer.abstention.describe(parameter)}
 
 
