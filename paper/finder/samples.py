@@ -138,8 +138,7 @@ def _add_door(targets: NDArray[np.float32], wall: Wall, elevation: Elevation, do
         nearer = np.abs(end_m) < _NEAR_M
         targets[:, column] = np.maximum(targets[:, column], _bell(end_m, _END_SIGMA_M))
         targets[nearer, column + 1] = end_m[nearer]
-    seen = door.visible_px
-    if seen.leaf + seen.frame + seen.opening < _VISIBLE_PX:
+    if door.visible_px.total < _VISIBLE_PX:
         targets[np.abs(offset_m) < _LITTLE_M, TARGETS.weight] = _LITTLE
 
 

@@ -114,10 +114,9 @@ def _door_results(
     preset: str, sensor: str, doors: Sequence[TrueDoor], candidates: Sequence[Doorway]
 ) -> Iterator[DoorResult]:
     for door in doors:
-        seen = door.visible_px
-        if seen.leaf + seen.frame + seen.opening < _VISIBLE_PX:
+        if door.visible_px.total < _VISIBLE_PX:
             continue
-        errors = [_errors(door, candidate) for candidate in candidates]
+        errors = [candidate.gap_to(door.x_m, door.y_m, door.yaw_deg) for candidate in candidates]
         near = [place_m <= _NEAR_M and turn_deg <= _NEAR_DEG for place_m, turn_deg in errors]
         exact = [place_m <= _EXACT_M and turn_deg <= _EXACT_DEG for place_m, turn_deg in errors]
         yield DoorResult(
@@ -129,9 +128,3 @@ def _door_results(
             is_near=any(near),
             is_first=any(near[:1]),
         )
-
-
-def _errors(door: TrueDoor, candidate: Doorway) -> tuple[float, float]:
-    """Return the errors of place in metres and of yaw in degrees."""
-    place_m = math.hypot(candidate.x_m - door.x_m, candidate.y_m - door.y_m)
-    return place_m, abs(math.remainder(candidate.yaw_deg - door.yaw_deg, 360))

@@ -17,7 +17,7 @@ from doorstate._models import FrozenModel
 from doorstate.clouds.floor import find_floor_z_m
 from doorstate.clouds.outliers import remove_outliers
 from doorstate.doorways.doorway import Doorway
-from doorstate.doorways.finder import find_doorways
+from doorstate.doorways.finder import FINDER_ERRORS, find_doorways
 from doorstate.simulation.manifest import flatten, unflatten
 from doorstate.simulation.noise.streams import sample_seed, stage_rng
 from doorstate.simulation.row import Row
@@ -28,7 +28,6 @@ Columns = Mapping[str, str]
 ADDED: Final = "added"  # in the column `candidate`: a door that the finder missed
 _FRAME = "frame."
 _HIT_M, _HIT_DEG = 0.35, 20.0  # a candidate this near a door is one of it
-_ADDED_SIGMAS = (0.08, 0.05, 3.0)  # the finder's errors: metres along the wall and across, degrees
 _MOST_SIGMAS = 2.0
 _VISIBLE_SHARE = 0.005  # of the image: leaf, frame or opening of a door that can be seen
 _POSE = ("x_m", "y_m", "yaw_deg", "width_m", "floor_z_m")
@@ -80,7 +79,7 @@ def recorded_columns(row: Columns, doorway: Doorway) -> Columns:
 def hit_door(row: Row, doorway: Doorway) -> TrueDoor | None:
     """Return the nearest door whose middle is within 0.35 m of a candidate's and whose wall within 20 degrees."""
     hits = [door for door in true_doors(row) if _is_hit(door, doorway)]
-    return min(hits, key=lambda door: _distance_m(door, doorway), default=None)
+    return min(hits, key=lambda door: doorway.gap_to(door.x_m, door.y_m, door.yaw_deg)[0], default=None)
 
 
 def frame_line(line: Columns) -> Columns:
@@ -109,9 +108,9 @@ def _missed(row: Row, candidates: Sequence[Doorway]) -> list[tuple[Doorway, True
     missed = []
     for door in true_doors(row):
         along_m, across_m, turn_deg = (
-            float(sigma * np.clip(rng.normal(), -_MOST_SIGMAS, _MOST_SIGMAS)) for sigma in _ADDED_SIGMAS
+            float(sigma * np.clip(rng.normal(), -_MOST_SIGMAS, _MOST_SIGMAS)) for sigma in FINDER_ERRORS
         )
-        if _visible_px(door) < least_px or any(_is_hit(door, doorway) for doorway in candidates):
+        if door.visible_px.total < least_px or any(_is_hit(door, doorway) for doorway in candidates):
             continue
         yaw = math.radians(door.yaw_deg)
         doorway = Doorway(
@@ -146,7 +145,7 @@ def _door_columns(door: TrueDoor | None, doorway: Doorway) -> dict[str, object]:
         "x_m": round(x_m, 5),
         "y_m": round(y_m, 5),
         "floor_z_m": round(z_m, 5),
-        "yaw_deg": round(_difference_deg(door.yaw_deg, doorway.yaw_deg), 4),
+        "yaw_deg": round(math.remainder(door.yaw_deg - doorway.yaw_deg, 360), 4),
     }
     return main_columns(door.model_copy(update=pose))
 
@@ -160,18 +159,6 @@ def _text(value: object) -> str:
     return "" if value is None else str(value)
 
 
-def _visible_px(door: TrueDoor) -> int:
-    return door.visible_px.leaf + door.visible_px.frame + door.visible_px.opening
-
-
 def _is_hit(door: TrueDoor, doorway: Doorway) -> bool:
-    turn_deg = abs(_difference_deg(door.yaw_deg, doorway.yaw_deg))
-    return _distance_m(door, doorway) <= _HIT_M and turn_deg <= _HIT_DEG
-
-
-def _distance_m(door: TrueDoor, doorway: Doorway) -> float:
-    return math.hypot(door.x_m - doorway.x_m, door.y_m - doorway.y_m)
-
-
-def _difference_deg(angle_deg: float, reference_deg: float) -> float:
-    return math.remainder(angle_deg - reference_deg, 360)
+    distance_m, turn_deg = doorway.gap_to(door.x_m, door.y_m, door.yaw_deg)
+    return distance_m <= _HIT_M and turn_deg <= _HIT_DEG

@@ -33,6 +33,10 @@ class Doorway:
         """Distance from the camera to the middle of the opening in plan view."""
         return math.hypot(self.x_m, self.y_m)
 
+    def gap_to(self, x_m: float, y_m: float, yaw_deg: float) -> tuple[float, float]:
+        """Return the distance in metres to another opening's middle, and the angle in degrees to its wall."""
+        return math.hypot(self.x_m - x_m, self.y_m - y_m), abs(math.remainder(self.yaw_deg - yaw_deg, 360))
+
     def to_doorway(self, points: Points) -> Points:
         """Return points (..., 3) of the sensor frame in the doorway's frame, float32."""
         moved = points - np.array([self.x_m, self.y_m, self.floor_z_m], np.float32)

@@ -15,17 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from doorstate.doorways.doorway import Doorway
+from doorstate.doorways.finder import FINDER_ERRORS, Correction
 from doorstate.inference.abstention import Abstention
 from doorstate.inference.backends.base import CloudOutputs
 from doorstate.inference.decode import abstention_of, leaf_fields
 from doorstate.inference.door import Door, DoorFrame
-from doorstate.inference.pose_errors import (
-    FINDER_ERRORS,
-    FINDER_POSITION_M,
-    Correction,
-    Scatter,
-    door_errors,
-)
+from doorstate.inference.pose_errors import FINDER_POSITION_M, Scatter, door_errors
 from doorstate.networks.card import WeightsCard
 from doorstate.types import DECISION_THRESHOLD, DOOR, STATES, DoorState
 

@@ -13,6 +13,7 @@ from doorstate.clouds.measured import is_measured
 from doorstate.doorways.doorway import Doorway
 from doorstate.errors import ConfigError
 from doorstate.inference.known import USUAL_WIDTH_M, DoorHint, ImageBox
+from doorstate.inference.seen_through import Opening
 from doorstate.types import Points
 
 Place = tuple[float, float]
@@ -64,8 +65,7 @@ def _towards_camera(x_m: float, y_m: float, yaw_deg: float) -> float:
 
 
 def _is_near(candidate: Doorway, place: Doorway, has_yaw: bool) -> bool:
-    gap_m = math.hypot(candidate.x_m - place.x_m, candidate.y_m - place.y_m)
-    turn_deg = abs((candidate.yaw_deg - place.yaw_deg + 180) % 360 - 180)
+    gap_m, turn_deg = candidate.gap_to(place.x_m, place.y_m, place.yaw_deg)
     return gap_m <= _NEAR_M and (not has_yaw or turn_deg <= _NEAR_DEG)
 
 
@@ -131,10 +131,6 @@ def _shared_view(candidate: Doorway, place: Doorway) -> float:
 
 def _view(doorway: Doorway) -> tuple[float, float]:
     """Return the bearings of the ends of an opening, in radians."""
-    yaw = math.radians(doorway.yaw_deg)
-    ends = [
-        (doorway.x_m + side * math.cos(yaw), doorway.y_m + side * math.sin(yaw))
-        for side in (-doorway.width_m / 2, doorway.width_m / 2)
-    ]
-    low, high = sorted(math.atan2(y_m, x_m) for x_m, y_m in ends)
+    ends = Opening.in_frame(doorway.x_m, doorway.y_m, doorway.yaw_deg, doorway.width_m)
+    low, high = sorted(map(_bearing, ends))
     return low, high

@@ -11,20 +11,10 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from doorstate.doorways.finder import FINDER_ERRORS, Correction
 from doorstate.networks.card import WeightsCard
 from doorstate.types import DoorState
 
-
-class Correction(NamedTuple):
-    """Correction of a candidate in the doorway's frame, or the usual size of its components."""
-
-    along_m: float
-    across_m: float
-    yaw_deg: float
-
-
-FINDER_ERRORS = Correction(0.08, 0.05, 3.0)
-"""Standard errors of candidates, which training adds to true doorways."""
 FINDER_POSITION_M = math.hypot(FINDER_ERRORS.along_m, FINDER_ERRORS.across_m)
 
 

@@ -20,6 +20,11 @@ class VisiblePixels(FrozenModel):
     frame: int = 0
     opening: int = 0  # through the opening, with nothing in front of it
 
+    @property
+    def total(self) -> int:
+        """Pixels that see any of them."""
+        return self.leaf + self.frame + self.opening
+
 
 class TrueDoor(FrozenModel):
     """A door in the level sensor frame; `yaw_deg` is the direction of its x axis, 90 for a wall straight ahead."""
