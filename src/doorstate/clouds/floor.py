@@ -22,6 +22,7 @@ _MIN_SHARE = 0.15  # of the largest layer's area; mirror images in a glossy floo
 _MAX_BELOW_SHARE = 0.05  # of the points below the camera; walls and legs go on below a table top
 _BELOW = 5  # slices
 _SAMPLE_POINTS = 12_288
+_LOWEST_SHARE = 0.01
 _HEIGHT_TOLERANCE_M = 0.12  # of a camera's height that is known
 
 
@@ -42,6 +43,11 @@ def find_floor_z_m(points: Points, camera_height_m: float | None = None) -> floa
     near = np.abs(low[:, 2] + camera_height_m) <= _HEIGHT_TOLERANCE_M
     measured_m = _largest_surface_z_m(low[near])
     return -camera_height_m if measured_m is None else measured_m
+
+
+def lowest_z_m(points: NDArray[Any]) -> float:
+    """Return the height of the lowest of (N, 3) points but for a hundredth, which noise places below the floor."""
+    return float(np.quantile(points[:, 2], _LOWEST_SHARE))
 
 
 def _low_points(points: NDArray[Any]) -> Points:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from doorstate._models import FrozenModel
+from doorstate.clouds.floor import lowest_z_m
 from doorstate.clouds.measured import is_measured
 from doorstate.doorways.column_scorer import ColumnScores, score_columns
 from doorstate.doorways.doorway import Doorway
@@ -21,7 +22,6 @@ from doorstate.doorways.walls import Wall, find_walls
 from doorstate.types import Points
 
 _MAX_POINTS = 40_000
-_LOWEST_SHARE = 0.01  # of the points; they are the floor where no other is known
 _UPRIGHT_M = (0.15, 2.2)  # heights above the floor without floor, skirting boards and ceiling
 _PEAK_M = 0.3  # a column is a peak if none so near scores higher
 _SNAP_M, _MIN_END = 0.2, 0.3  # of an edge from the end that a column proposes, and its least probability
@@ -70,7 +70,7 @@ def find_doorways(
     points = thinned(cloud)
     if len(points) == 0:
         return []
-    floor_m = _floor_m(points) if floor_z_m is None else floor_z_m
+    floor_m = lowest_z_m(points) if floor_z_m is None else floor_z_m
     found = [
         doorway
         for wall, elevation in _survey(points, floor_m)
@@ -95,10 +95,6 @@ def thinned(cloud: Points) -> NDArray[np.float32]:
     some = cloud[::step, ::step].reshape(-1, 3) if cloud.ndim == 3 else cloud
     points = some[is_measured(some)]
     return np.asarray(points[:: max(1, len(points) // _MAX_POINTS)], dtype=np.float32)
-
-
-def _floor_m(points: NDArray[np.float32]) -> float:
-    return float(np.quantile(points[:, 2], _LOWEST_SHARE))
 
 
 def _survey(points: NDArray[np.float32], floor_m: float) -> list[tuple[Wall, Elevation]]:

@@ -12,7 +12,6 @@ from doorstate.inference.door import Door
 from doorstate.inference.prediction import Prediction
 
 DOOR_HEIGHT_M = 2.0  # of the drawing; no head predicts it
-FLOOR_SHARE = 0.01  # of the points lie below the floor, by noise
 _REFUSED_HEIGHT_M = 1.0  # lower than doors, so that both can be told apart where they overlap
 _SWING_DEG = 90.0  # a leaf is drawn with the way that it takes to be open
 _STEPS = 16

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from doorstate.clouds.floor import lowest_z_m
 from doorstate.doorways.doorway import Doorway
 from doorstate.doorways.evidence import DoorwayEvidence, find_evidence
 from doorstate.doorways.finder import thinned
@@ -73,7 +74,7 @@ def check_doorway(cloud: Points, door: Door, limits: DoorwayLimits) -> DoorwayCh
     points = points[:: max(1, round(len(points) / _MAX_POINTS))]
     if door.state is None or len(points) == 0:
         return DoorwayCheck(None)
-    floor_z_m = float(np.quantile(points[:, 2], 0.01)) if door.floor_z_m is None else door.floor_z_m
+    floor_z_m = lowest_z_m(points) if door.floor_z_m is None else door.floor_z_m
     doorway = Doorway(door.x_m, door.y_m, door.yaw_deg, door.width_m, floor_z_m)
     evidence = find_evidence(points, doorway)
     if evidence.in_view < _MIN_IN_VIEW:

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from doorstate.clouds.floor import lowest_z_m
 from doorstate.inference.view_cells import NEIGHBOUR, nearest_measured
 from doorstate.types import Points
 
@@ -97,7 +98,7 @@ def floor_rays(
     some = points[ahead][:: max(1, len(points) // _MAX_POINTS)]
     if len(some) <= NEIGHBOUR:
         return None
-    spots = _floor_spots(opening, float(np.quantile(some[:, 2], 0.01)), reach_m)
+    spots = _floor_spots(opening, lowest_z_m(some), reach_m)
     rays = spots[..., 1:] / np.maximum(spots[..., :1], 1e-3)
     low, high = np.quantile(some[:, 1:] / some[:, :1], (0.005, 0.995), axis=0)
     in_view = (spots[..., 0] > 0) & ((rays >= low) & (rays <= high)).all(axis=-1)

@@ -10,10 +10,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from doorstate.clouds.floor import lowest_z_m
 from doorstate.clouds.measured import is_measured
 from doorstate.errors import CameraError, DoorstateError, summarize_exception
 from doorstate.inference.abstention import Abstention
-from doorstate.inference.door_lines import FLOOR_SHARE, door_lines
+from doorstate.inference.door_lines import door_lines
 from doorstate.inference.door_report import DoorPose, DoorReport
 from doorstate.inference.posed import predict_posed
 from doorstate.inference.prediction import Prediction
@@ -184,7 +185,7 @@ class _Seen(NamedTuple):
     @property
     def floor_z_m(self) -> float:
         """Height of the lowest points in the level sensor frame."""
-        return float(np.quantile(self._level[:, 2], FLOOR_SHARE)) if len(self.sample) else 0.0
+        return lowest_z_m(self._level) if len(self.sample) else 0.0
 
 
 def _sample(points: Points) -> Points:

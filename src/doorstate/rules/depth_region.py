@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from doorstate.clouds.floor import lowest_z_m
 from doorstate.doorways.planes import voxel_downsample
 from doorstate.rules.base import Detection, Parameters, Rule, RuleResult
 from doorstate.rules.walls import nearby_points
@@ -47,7 +48,7 @@ class DepthRegionRule(Rule[DepthRegionParameters]):
         if len(points) < p.min_points:
             return RuleResult.abstain("too few points")
         points = voxel_downsample(points, p.voxel_m)
-        height_m = points[:, 2] - np.quantile(points[:, 2], 0.01)
+        height_m = points[:, 2] - lowest_z_m(points)
         in_door = (height_m > p.floor_clearance_m) & (height_m < p.door_height_m)
         before_reach = (points[:, 0] > p.nearest_m) & (points[:, 0] < p.reach_m)
         on_floor = (height_m <= p.floor_clearance_m) & (points[:, 2] < -p.camera_height_m)

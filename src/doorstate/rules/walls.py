@@ -8,6 +8,7 @@ import math
 
 import numpy as np
 
+from doorstate.clouds.floor import lowest_z_m
 from doorstate.doorways.plan_lines import Flags, Floats
 from doorstate.doorways.planes import Plane
 from doorstate.rules.base import Detection, Parameters, RuleResult, measured_points
@@ -100,7 +101,7 @@ def nearby_points(cloud: Points, farthest_m: float) -> tuple[Floats, float]:
 
 def above_floor(points: Floats, margin_m: float) -> Flags:
     """Return a mask of the (N, 3) points that are higher than the lowest by more than a margin."""
-    mask: Flags = points[:, 2] > np.quantile(points[:, 2], 0.01) + margin_m
+    mask: Flags = points[:, 2] > lowest_z_m(points) + margin_m
     return mask
 
 

@@ -10,10 +10,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from doorstate.clouds.floor import lowest_z_m
 from doorstate.clouds.measured import is_measured
 from doorstate.clouds.preparation import NUM_POINTS
 from doorstate.errors import DoorstateError, WriteParameter, python_parameter
-from doorstate.inference.door_lines import FLOOR_SHARE, Line, door_lines
+from doorstate.inference.door_lines import Line, door_lines
 from doorstate.inference.known import DoorKnown
 from doorstate.inference.network_predictor import NetworkPredictor
 from doorstate.inference.posed import predict_posed
@@ -73,7 +74,7 @@ def make_entry(
     whole = thin_for_display(named.cloud)
     if prediction.tilt is not None:
         whole = prediction.tilt.to_level(whole)
-    floor_z_m = float(np.quantile(whole[:, 2], FLOOR_SHARE))
+    floor_z_m = lowest_z_m(whole)
     return entry | {
         "prediction": prediction_to_dict(prediction, parameter, named.pose),
         "cloud": encode_cloud(prepared.points[:NUM_POINTS], parts),
