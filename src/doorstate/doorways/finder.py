@@ -17,7 +17,7 @@ from doorstate.clouds.measured import is_measured
 from doorstate.doorways.column_scorer import ColumnScores, score_columns
 from doorstate.doorways.doorway import Doorway
 from doorstate.doorways.elevation import COLUMN_M, Elevation, wall_elevation
-from doorstate.doorways.plan_lines import Floats, angle_deg
+from doorstate.doorways.plan_lines import Floats
 from doorstate.doorways.walls import Wall, find_walls
 from doorstate.types import Points
 
@@ -148,9 +148,6 @@ def _peaks(probability: Floats, min_score: float) -> list[int]:
 
 
 def _are_one(first: Doorway, second: Doorway) -> bool:
-    near = math.hypot(first.x_m - second.x_m, first.y_m - second.y_m) <= _SAME_M
-    axes = [
-        np.array([math.cos(math.radians(yaw)), math.sin(math.radians(yaw))])
-        for yaw in (first.yaw_deg, second.yaw_deg)
-    ]
-    return near and angle_deg(*axes) <= _SAME_DEG
+    distance_m, turn_deg = first.gap_to(second.x_m, second.y_m, second.yaw_deg)
+    # The two faces of a thin wall differ by half a turn.
+    return distance_m <= _SAME_M and min(turn_deg, 180 - turn_deg) <= _SAME_DEG

@@ -8,14 +8,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from doorstate.doorways.elevation import COLUMN_M, RELIEF_M, ROW_M
+from doorstate.doorways.elevation import COLUMN_M, NUM_ROWS, RELIEF_M, ROW_M
 from doorstate.types import Indices, Points
 
 _MAX_COLUMNS, _MAX_ROWS = round(0.2 / COLUMN_M), round(0.2 / ROW_M)
+_HALF_WIDTH_M = 1.5  # of the wall about the doorway
 _MIN_CELLS = 2  # narrower holes lie between the points of a crop anyway
-_MIN_LOST = (
-    14.0  # points that the cells around let expect in a hole; by chance one of a million places has none
-)
+# Points of a hole, by the density around it; where so many are expected, one of a million places has none by chance.
+_MIN_LOST = 14.0
 _PLANE_M = 0.02  # of every point around to the plane
 _PER_ROW = 2  # points of a filled cell, one above the other
 
@@ -48,14 +48,13 @@ def fill_small_holes(points: Points, camera_m: Points) -> Filling:
         points: (N, 3) measured points in the doorway's frame.
         camera_m: (3,) place of the camera in it.
     """
-    grid = _grid(points, camera_m.astype(np.float64))
+    camera = camera_m.astype(np.float64)
+    grid = _grid(points, camera)
     none = Filling(np.empty((0, 3), np.float32), np.empty(0, np.int64))
     if grid is None:
         return none
     parts = [
-        part
-        for hole in _small_holes(grid.counts)
-        if (part := _fill(hole, grid, points, camera_m.astype(np.float64))) is not None
+        part for hole in _small_holes(grid.counts) if (part := _fill(hole, grid, points, camera)) is not None
     ]
     if not parts:
         return none
@@ -71,9 +70,9 @@ def _grid(points: Points, camera_m: NDArray[np.float64]) -> _Grid | None:
         return None
     share = camera_m[1] / towards_m[ahead]
     crossings = (camera_m + (points[ahead] - camera_m) * share[:, None])[:, [0, 2]]
-    low_m = np.array([-1.5, 0.0])
+    low_m = np.array([-_HALF_WIDTH_M, 0.0])
     cell = np.floor((crossings - low_m) / (COLUMN_M, ROW_M)).astype(np.int64)
-    shape = (round(3.0 / COLUMN_M), round(2.4 / ROW_M))
+    shape = (round(2 * _HALF_WIDTH_M / COLUMN_M), NUM_ROWS)
     inside = ((cell >= 0) & (cell < shape)).all(axis=1)
     number = cell[inside, 0] * shape[1] + cell[inside, 1]
     order = np.argsort(number, kind="stable")
@@ -86,20 +85,13 @@ def _small_holes(counts: NDArray[np.int64]) -> list[list[tuple[int, int]]]:
     """Return the cells of each hole between filled cells that is small in both directions."""
     empty = counts == 0
     small = _short_runs(empty, _MAX_COLUMNS) & _short_runs(empty.T, _MAX_ROWS).T
-    left = {(int(column), int(row)) for column, row in np.argwhere(small)}
-    holes = []
-    while left:
-        hole, front = [], [left.pop()]
-        while front:
-            column, row = front.pop()
-            hole.append((column, row))
-            for near in ((column - 1, row), (column + 1, row), (column, row - 1), (column, row + 1)):
-                if near in left:
-                    left.remove(near)
-                    front.append(near)
-        if len(hole) >= _MIN_CELLS:
-            holes.append(sorted(hole))
-    return sorted(holes)
+    if not small.any():
+        return []
+    from scipy.ndimage import label  # few clouds have small holes
+
+    numbers, count = label(small)
+    holes = [[(int(c), int(r)) for c, r in np.argwhere(numbers == number)] for number in range(1, count + 1)]
+    return sorted(hole for hole in holes if len(hole) >= _MIN_CELLS)
 
 
 def _short_runs(empty: NDArray[np.bool_], most: int) -> NDArray[np.bool_]:

@@ -19,12 +19,13 @@ from doorstate.clouds.shape import check_single_cloud
 from doorstate.clouds.units import check_units
 from doorstate.doorways.crop import CropSpec, crop_cloud
 from doorstate.doorways.doorway import Doorway
-from doorstate.doorways.finder import find_doorways
+from doorstate.doorways.finder import find_doorways, thinned
 from doorstate.errors import TooFewPointsError
 from doorstate.inference.abstention import Abstention
 from doorstate.inference.backends import CloudOutputs, run_by_size
 from doorstate.inference.door import Door
 from doorstate.inference.doorway_answers import Answer, decide_doors, refused_candidate
+from doorstate.inference.doorway_check import DoorwayCheck
 from doorstate.inference.known import Known
 from doorstate.inference.known_doorways import hinted_doorways
 from doorstate.inference.network_predictor import NetworkPredictor
@@ -150,16 +151,25 @@ class DoorwayPredictor(NetworkPredictor):
         doors = sorted(decided.doors, key=lambda door: door.remoteness_m)
         if has_hint and decided.known is not None:
             doors = [decided.known, *(door for door in doors if door is not decided.known)]
-        checked = [self._check(door, scene.cloud) for door in doors[:MAX_DOORS]]
+        checked = self._check(doors[:MAX_DOORS], scene.cloud)
         refused = (*decided.refused, *scene.refused)
         return Prediction.from_doors(checked, refused, num_points, 0.0, scene.tilt)
 
-    def _check(self, door: Door, cloud: Points) -> Door:
-        """Return the door with what the gate says of it."""
-        if self.gate is None or door.state is None:
-            return door
-        abstention, leaf_seen = self.gate.check_doorway(cloud, door)
-        return replace(door, leaf_seen=leaf_seen) if abstention is None else door.refuse(abstention)
+    def _check(self, doors: Sequence[Door], cloud: Points) -> list[Door]:
+        """Return the doors with what the gate says of them."""
+        if self.gate is None:
+            return list(doors)
+        points = thinned(cloud)  # once for all doors
+        return [
+            door if door.state is None else _with_check(door, self.gate.check_doorway(points, door))
+            for door in doors
+        ]
+
+
+def _with_check(door: Door, check: DoorwayCheck) -> Door:
+    if check.abstention is not None:
+        return door.refuse(check.abstention)
+    return replace(door, leaf_seen=check.leaf_seen)
 
 
 def _check_points(cloud: Points) -> int:

@@ -68,7 +68,7 @@ class ReadOptions:
                     field=field,
                     expected=f"{-limit_deg} to {limit_deg}",
                 )
-        if not 0 < (self.camera_height_m or 1.0) <= MAX_CAMERA_HEIGHT_M or self.camera_height_m == 0:
+        if self.camera_height_m is not None and not 0 < self.camera_height_m <= MAX_CAMERA_HEIGHT_M:
             raise CameraError(
                 f"a camera {self.camera_height_m} m above the floor is impossible",
                 field="camera_height_m",
