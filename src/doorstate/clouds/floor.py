@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from doorstate.types import Points
 
-_LOWEST_M, _HIGHEST_M = -2.5, -0.06  # of a floor; nobody holds a camera higher
+_LOWEST_M, _HIGHEST_M = -2.5, -0.06  # heights of a floor below the camera
 _SLICE_M = 0.02
 _SLICES = round((_HIGHEST_M - _LOWEST_M) / _SLICE_M)
 _LAYER = 3  # slices; a floor that is level within 1 degree spreads over 3.5 cm in 2 m

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a room looks like from a robot, as evidence for a direction up.
+"""Evidence for a direction up, from the usual properties of rooms and of cameras on robots.
 
 Few surfaces are aslant, the floor has nothing below it and lies at a usual height, rooms are not higher than usual, the
 ceiling is well above the camera, and cameras are mounted squarely, looking ahead rather than up or down.

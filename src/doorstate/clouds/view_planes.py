@@ -30,7 +30,7 @@ _MAX_PLANES = 10
 _MIN_CELLS, _MIN_SHARE = 8, 0.012  # of a plane
 _REFITS = 2
 _TOLERANCE = 2.5  # deviations of inverse depth
-_NOISE_QUANTILE = 0.4  # at least so many cells hold one plane each
+_NOISE_QUANTILE = 0.4  # least share of the cells that hold a single plane
 _NOISE_LIMITS = 0.0007, 0.012  # 1 / m; of a perfect and of a poor camera
 _RIDGE = 1e-7
 

@@ -56,7 +56,7 @@ def draw_splits(rows: Sequence[Mapping[str, str]], protocol: str, seed: int) -> 
         splits = split_poses(rows, NUM_FOLDS, seed)
     else:
         splits = (_by_scene if protocol == "by-scene" else _by_stratum)(rows, seed)
-    # Doors that the finder missed help in training, but nobody would be asked about them.
+    # Doors that the finder missed are for training only: a predictor would not crop them.
     added = [row["sample_id"] for row in rows if row.get("candidate") == ADDED]
     for roles in splits:
         roles |= {sample: "unused" for sample in added if roles[sample] != "train"}

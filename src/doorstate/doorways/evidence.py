@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a cloud shows of one doorway: shares of the cells of its opening, and what surrounds those that are missing.
+"""Measurements of one doorway: shares of the cells of its opening, and ranges around the missing ones.
 
 A cell is missing if no sight line crosses it although the wall on both sides of its row is measured densely enough, so
 that far or grazing walls, and rows out of view, are no holes.
@@ -28,8 +28,10 @@ _BEFORE_M = (0.1, 1.0)  # floor before an opening
 _FLOOR_M = 0.1  # of a point to the height of the floor
 _MIN_FLOOR_POINTS = 8
 _RANGE_QUANTILES = (0.002, 0.995)
-_FLUSH_M, _MAX_FLUSH_M = 0.05, 0.1  # of the depth of a cell to the middle one of the opening, ...
-_SCATTERS = 3.0  # ... or so many times the median distance of the rims' cells to theirs
+# Largest difference between the depth of a flush cell and the median depth of the opening: at least the first, at most
+# the second, and between them three times the scatter of the wall on both sides.
+_FLUSH_M, _MAX_FLUSH_M = 0.05, 0.1
+_SCATTERS = 3.0
 
 Cells = NDArray[np.float64]
 

@@ -31,8 +31,8 @@ _MIN_WIDTH_M = 0.55  # of one leaf of double doors
 _RAY_TAN = 0.05  # side of the cells of the view
 _MAX_TAN = 2.0
 _NEARER_M = 0.15  # a sight line that ends so much nearer does not reach the leaf
-_MIN_CELLS = 10  # of the leaf, in view ...
-_OUTER, _MIN_OUTER_CELLS = 4, 5  # ... of which so many lie in its outer steps: reveals of thick walls do not
+_MIN_CELLS = 10  # of the leaf, in view
+_OUTER, _MIN_OUTER_CELLS = 4, 5  # outer steps of the leaf, and least cells in view there: reveals have none
 _MAX_POINTS = 10_000
 
 

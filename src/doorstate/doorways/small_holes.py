@@ -14,7 +14,7 @@ from doorstate.types import Indices, Points
 _MAX_COLUMNS, _MAX_ROWS = round(0.2 / COLUMN_M), round(0.2 / ROW_M)
 _HALF_WIDTH_M = 1.5  # of the wall about the doorway
 _MIN_CELLS = 2  # narrower holes lie between the points of a crop anyway
-# Points of a hole, by the density around it; where so many are expected, one of a million places has none by chance.
+# Least number of points expected in a hole, from the density around it: one place in a million is empty by chance.
 _MIN_LOST = 14.0
 _PLANE_M = 0.02  # of every point around to the plane
 _PER_ROW = 2  # points of a filled cell, one above the other
@@ -95,7 +95,7 @@ def _small_holes(counts: NDArray[np.int64]) -> list[list[tuple[int, int]]]:
 
 
 def _short_runs(empty: NDArray[np.bool_], most: int) -> NDArray[np.bool_]:
-    """Return the cells in runs of at most so many empty cells along the first axis, with filled cells at both ends."""
+    """Return the cells in runs of at most `most` empty cells along the first axis, with filled cells at both ends."""
     short = np.zeros_like(empty)
     for length in range(1, most + 1):
         starts = len(empty) - length - 1  # places of the filled cell before a run

@@ -41,7 +41,7 @@ class DoorwayCheck(NamedTuple):
     """Result of a check of one door."""
 
     abstention: Abstention | None  # reason why its state is refused
-    leaf_seen: bool | None = None  # of an open door; None where nobody looked
+    leaf_seen: bool | None = None  # of an open door; None where it was not checked
 
 
 class DoorwayLimits(NamedTuple):

@@ -70,7 +70,7 @@ class Prediction(StateAnswer):
 
     @property
     def leaf_seen(self) -> bool | None:
-        """False if no leaf was seen at an open door, so that glass cannot be excluded; None where nobody looked."""
+        """False if no leaf was seen at an open door, so that glass cannot be excluded; None if not checked."""
         return self.doors[0].leaf_seen if self.doors else None
 
     def confirms(self, state: DoorState, *, require_leaf: bool = True) -> bool:

@@ -8,7 +8,7 @@ import math
 import time
 from collections.abc import Callable
 
-_IPV6_PREFIX = 64  # one household or machine has so many addresses (RFC 6177)
+_IPV6_PREFIX = 64  # of the addresses of one household or machine (RFC 6177)
 _MAX_CLIENTS = 4096
 _MAX_DEBT = 3.0  # times the highest credit
 
