@@ -29,7 +29,7 @@ Mount = Literal["level", "tilted", "on its side"]
 MOUNTS: tuple[Mount, ...] = ("level", "tilted", "on its side")
 SOURCES = [(preset, sensor) for preset in ("varied", "cluttered", "no-door") for sensor in ("xtion", "d435")]
 REASONS = ("tilt_ambiguous", "tilt_upside_down", "tilt_one_plane")
-_SEED = 1_000_003  # of no data set
+_SEED = 1_000_033  # of no data set, and unused while constants of the estimate were chosen
 _MAX_TILT_DEG = 30.0
 _WRONG_DEG = 10.0
 
