@@ -85,6 +85,37 @@ def doorways(
 
 
 @app.command()
+def doors(
+    out: Out = Path("docs/benchmarks"),
+    weights: Annotated[
+        str, typer.Option(help="Weights for doorways, by name or path; the default network if left out.")
+    ] = "",
+    scenes: Annotated[int, typer.Option(help="Scenes of each preset and sensor.", min=1)] = 50,
+    seed: Annotated[int, typer.Option(help="Seed of the scenes.")] = 1_000_003,
+) -> None:
+    """Count doors found in simulated frames, right states and false doors, and answers that a tilt changes."""
+    from doorstate.cli.progress import progress_bar
+    from doorstate.errors import ConfigError
+
+    from .doors import doors_table, load_doorway_predictor, measure_doors, reasons_table
+    from .tilted_answers import measure_tilted_answers, tilted_answers_table
+
+    try:
+        predictor = load_doorway_predictor(weights or None)
+    except ConfigError as error:
+        raise typer.BadParameter(str(error), param_hint="--weights") from error
+    with progress_bar("tilts") as progress:
+        tilted = tilted_answers_table(measure_tilted_answers(predictor, progress))
+    with progress_bar("doors") as progress:
+        found, frames = measure_doors(predictor, scenes, progress, seed)
+    tables = (tilted, doors_table(found, frames), reasons_table(found))
+    card = predictor.card
+    _write(
+        tables, out / "doors.md", network=card.network, trained_on=card.trained_on, scenes=scenes, seed=seed
+    )
+
+
+@app.command()
 def thinning(out: Out = Path("docs/benchmarks"), network: Network = "pointnet2", count: Count = 300) -> None:
     """Compare predictions and times of sampling from a part of the points with those from all points."""
     from doorstate.cli.progress import progress_bar

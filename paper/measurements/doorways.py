@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from collections.abc import Iterable, Iterator, Sequence
+from typing import NamedTuple, Protocol, TypeVar
 
 import pandas as pd
 
@@ -16,19 +16,45 @@ from doorstate.clouds.outliers import remove_outliers
 from doorstate.doorways.doorway import Doorway
 from doorstate.doorways.finder import find_doorways
 from doorstate.evaluation.table import Table, count_column, label_column, number_column
+from doorstate.simulation.frames import Frame
 from doorstate.simulation.generate import simulate_rows
 from doorstate.simulation.presets import PRESETS, PresetName
+from doorstate.simulation.row import Row
 from doorstate.simulation.truth import TrueDoor, true_doors
 
-_SEED = 1_000_003  # of no data set
+SEED = 1_000_003  # of no data set
 SOURCES: tuple[tuple[PresetName, str], ...] = tuple(
     (preset, sensor)
     for preset in ("varied", "cluttered", "corridor", "two-doors", "no-door")
     for sensor in ("xtion", "d435")
 )
+NEAR_M = 0.35  # of a door: a network corrects a candidate so near
+VISIBLE_PX = 1500  # of a door that should be found
 _EXACT_M, _EXACT_DEG = 0.08, 4.0
-_NEAR_M, _NEAR_DEG = 0.35, 20.0  # a network corrects a candidate so near
-_VISIBLE_PX = 1500
+_NEAR_DEG = 20.0
+
+
+class Placed(Protocol):
+    """Candidate or answer with a place in the level sensor frame."""
+
+    @property
+    def x_m(self) -> float: ...
+    @property
+    def y_m(self) -> float: ...
+    @property
+    def yaw_deg(self) -> float: ...
+
+
+AnyPlaced = TypeVar("AnyPlaced", bound=Placed)
+
+
+class View(NamedTuple):
+    """One simulated frame."""
+
+    preset: str
+    sensor: str
+    row: Row
+    frame: Frame
 
 
 class DoorResult(NamedTuple):
@@ -52,26 +78,50 @@ class FrameResult(NamedTuple):
     milliseconds: float  # of one core
 
 
-def measure_doorways(scenes: int, progress: Progress) -> tuple[list[DoorResult], list[FrameResult]]:
-    """Return the results of all doors with at least 1500 visible pixels, and of all frames.
+def simulated_views(scenes: int, progress: Progress, seed: int = SEED) -> Iterator[View]:
+    """Yield the frames of all presets and sensors.
 
     Args:
         scenes: scenes of each preset and sensor.
         progress: called after each scene.
+        seed: seed of the scenes.
     """
-    doors: list[DoorResult] = []
-    frames: list[FrameResult] = []
     for number, (preset, sensor) in enumerate(SOURCES):
         for index in range(scenes):
-            for row, frame in zip(*simulate_rows(PRESETS[preset], _SEED, index, sensor), strict=True):
-                cloud = remove_outliers(frame.points).points
-                floor_m = find_floor_z_m(cloud)
-                started = time.process_time()
-                candidates = find_doorways(cloud, floor_m)
-                milliseconds = (time.process_time() - started) * 1000
-                frames.append(FrameResult(preset, sensor, len(candidates), milliseconds))
-                doors += _door_results(preset, sensor, true_doors(row), candidates)
+            for row, frame in zip(*simulate_rows(PRESETS[preset], seed, index, sensor), strict=True):
+                yield View(preset, sensor, row, frame)
             progress(number * scenes + index + 1, len(SOURCES) * scenes)
+
+
+def visible_doors(row: Row) -> list[TrueDoor]:
+    """Return the doors that should be found: of their leaf, frame or opening at least 1500 pixels are visible."""
+    return [door for door in true_doors(row) if door.visible_px.total >= VISIBLE_PX]
+
+
+def gap_to(door: TrueDoor, place: Placed) -> tuple[float, float]:
+    """Return the distance in metres from a door to a place, and the angle in degrees between their walls."""
+    turn_deg = abs(math.remainder(place.yaw_deg - door.yaw_deg, 360))
+    return math.hypot(place.x_m - door.x_m, place.y_m - door.y_m), turn_deg
+
+
+def nearest(door: TrueDoor, places: Iterable[AnyPlaced]) -> AnyPlaced | None:
+    """Return the place nearest to a door, of those within 0.35 m; None if there is none."""
+    near = [place for place in places if gap_to(door, place)[0] <= NEAR_M]
+    return min(near, key=lambda place: gap_to(door, place)[0], default=None)
+
+
+def measure_doorways(scenes: int, progress: Progress) -> tuple[list[DoorResult], list[FrameResult]]:
+    """Return the results of all visible doors and of all frames; arguments are those of `simulated_views`."""
+    doors: list[DoorResult] = []
+    frames: list[FrameResult] = []
+    for preset, sensor, row, frame in simulated_views(scenes, progress):
+        cloud = remove_outliers(frame.points).points
+        floor_m = find_floor_z_m(cloud)
+        started = time.process_time()
+        candidates = find_doorways(cloud, floor_m)
+        milliseconds = (time.process_time() - started) * 1000
+        frames.append(FrameResult(preset, sensor, len(candidates), milliseconds))
+        doors += (_door_result(preset, sensor, door, candidates) for door in visible_doors(row))
     return doors, frames
 
 
@@ -100,31 +150,26 @@ def doorways_table(doors: Sequence[DoorResult], frames: Sequence[FrameResult]) -
             label_column("preset"),
             label_column("sensor"),
             count_column("doors"),
-            number_column("near", f"within {_NEAR_M} m and {_NEAR_DEG:g}°", 3),
+            number_column("near", f"within {NEAR_M} m and {_NEAR_DEG:g}°", 3),
             number_column("exact", f"within {_EXACT_M} m and {_EXACT_DEG:g}°", 3),
             number_column("first", "best candidate", 3),
             number_column("candidates", "candidates a frame", 1),
             number_column("milliseconds", "ms", 1),
         ],
-        note=f"Doors with at least {_VISIBLE_PX} visible pixels of leaf, frame or opening; time of one core, median.",
+        note=f"Doors with at least {VISIBLE_PX} visible pixels of leaf, frame or opening; time of one core, median.",
     )
 
 
-def _door_results(
-    preset: str, sensor: str, doors: Sequence[TrueDoor], candidates: Sequence[Doorway]
-) -> Iterator[DoorResult]:
-    for door in doors:
-        if door.visible_px.total < _VISIBLE_PX:
-            continue
-        errors = [candidate.gap_to(door.x_m, door.y_m, door.yaw_deg) for candidate in candidates]
-        near = [place_m <= _NEAR_M and turn_deg <= _NEAR_DEG for place_m, turn_deg in errors]
-        exact = [place_m <= _EXACT_M and turn_deg <= _EXACT_DEG for place_m, turn_deg in errors]
-        yield DoorResult(
-            preset=preset,
-            sensor=sensor,
-            state=str(door.state),
-            distance_m=math.hypot(door.x_m, door.y_m),
-            is_exact=any(exact),
-            is_near=any(near),
-            is_first=any(near[:1]),
-        )
+def _door_result(preset: str, sensor: str, door: TrueDoor, candidates: Sequence[Doorway]) -> DoorResult:
+    errors = [gap_to(door, candidate) for candidate in candidates]
+    near = [place_m <= NEAR_M and turn_deg <= _NEAR_DEG for place_m, turn_deg in errors]
+    exact = [place_m <= _EXACT_M and turn_deg <= _EXACT_DEG for place_m, turn_deg in errors]
+    return DoorResult(
+        preset=preset,
+        sensor=sensor,
+        state=str(door.state),
+        distance_m=math.hypot(door.x_m, door.y_m),
+        is_exact=any(exact),
+        is_near=any(near),
+        is_first=any(near[:1]),
+    )
