@@ -7,17 +7,23 @@ Heavy imports happen inside the commands, because every worker process imports t
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from benchmarks.options import (
+    environment_and,
+    finish,
+    parse_integers,
+    parse_networks,
+    parse_points,
+    print_stored,
+)
 from doorstate.errors import ConfigError, DoorstateError
 
 if TYPE_CHECKING:
     from benchmarks.clouds import Clouds
-    from doorstate.evaluation.table import Table
 
 Out = Annotated[Path, typer.Option(help="Folder of the JSON and Markdown files.")]
 Networks = Annotated[str, typer.Option(help="Names separated by commas, or all.")]
@@ -74,11 +80,11 @@ def networks(
     from benchmarks.store import Store
     from doorstate.cli.progress import progress_bar
 
-    names, numbers_of_points = _parse_networks(networks), _parse_points(points)
+    names, numbers_of_points = parse_networks(networks), parse_points(points)
     ports = {"pointnet": port_pointnet, "pointnet2": port_pointnet, "dgcnn": port_dgcnn}
     checkouts = {name: path for name, path in ports.items() if path is not None}
     plan = Plan(batch, repeats, threads, checkouts, pyg, same_allocator, compiled)
-    settings = _settings(
+    settings = environment_and(
         batch=batch,
         repeats=repeats,
         threads=threads,
@@ -99,7 +105,7 @@ def networks(
     pairs = [(name, number) for name in names for number in numbers_of_points]
     with progress_bar("networks") as progress:
         measure_networks(plan, pairs, load_clouds, store, progress)
-    _print(table_of(store, pairs, plan), out / "networks.md", list_failures(store.results.values()))
+    print_stored(table_of(store, pairs, plan), out / "networks.md", list_failures(store.results.values()))
 
 
 @app.command()
@@ -114,11 +120,40 @@ def latency(
     from benchmarks.latency import latency_table, measure_latency
     from doorstate.cli.progress import progress_bar
 
-    names, numbers_of_points = _parse_networks(networks), _parse_points(points)
-    numbers_of_threads = _parse_integers("threads", threads, 1)
+    names, numbers_of_points = parse_networks(networks), parse_points(points)
+    numbers_of_threads = parse_integers("threads", threads, 1)
     with progress_bar("latency") as progress:
         rows = measure_latency(names, numbers_of_points, numbers_of_threads, repeats, progress)
-    _finish(out, "latency", rows, latency_table(rows), threads=threads, repeats=repeats)
+    finish(out, "latency", rows, latency_table(rows), threads=threads, repeats=repeats)
+
+
+@app.command()
+def doorways(
+    out: Out,
+    weights: Annotated[
+        Path | None, typer.Option(help="Weights for doorways, .safetensors or .onnx; default: untrained.")
+    ] = None,
+    network: Annotated[str, typer.Option(help="Untrained network, without weights.")] = "pointnet2",
+    candidates: Annotated[
+        str, typer.Option(help="Numbers of candidate doorways, separated by commas.")
+    ] = "1,3,5,8",
+    threads: Annotated[str, typer.Option(help="Numbers of threads, separated by commas.")] = "1,2",
+    repeats: Repeats = 15,
+) -> None:
+    """Latency from a raw 640 x 480 cloud in memory to every door in it, by stage."""
+    from benchmarks.doorways import doorways_table, measure_doorways
+    from doorstate.cli.progress import progress_bar
+
+    parse_networks(network)
+    numbers_of_candidates = parse_integers("candidates", candidates, 1)
+    numbers_of_threads = parse_integers("threads", threads, 1)
+    with progress_bar("doorways") as progress:
+        rows = measure_doorways(
+            weights, network, numbers_of_candidates, numbers_of_threads, repeats, progress
+        )
+    table = doorways_table(rows, has_weights=weights is not None)
+    name = f"untrained {network}" if weights is None else weights.name
+    finish(out, "doorways", rows, table, weights=name, threads=threads, repeats=repeats)
 
 
 @app.command()
@@ -141,11 +176,11 @@ def busy(
     names = [name.strip() for name in runtimes.split(",")]
     if not set(names) <= set(RUNTIMES):
         raise ConfigError(f"cannot use {runtimes!r}", field="runtimes", expected=" or ".join(RUNTIMES))
-    numbers_of_threads = _parse_integers("threads", threads, 1)
-    numbers_of_busy = _parse_integers("processes", processes, 0)
+    numbers_of_threads = parse_integers("threads", threads, 1)
+    numbers_of_busy = parse_integers("processes", processes, 0)
     with progress_bar("busy") as progress:
         rows = measure_busy(network, names, numbers_of_threads, numbers_of_busy, repeats, progress)
-    _finish(out, "busy", rows, busy_table(rows), network=network, processes=processes, repeats=repeats)
+    finish(out, "busy", rows, busy_table(rows), network=network, processes=processes, repeats=repeats)
 
 
 @app.command()
@@ -162,7 +197,7 @@ def rules(
 
     with progress_bar("rules") as progress:
         rows = measure_rules(count, points, threads, repeats, progress)
-    _finish(out, "rules", rows, rules_table(rows), clouds=count, threads=threads, repeats=repeats)
+    finish(out, "rules", rows, rules_table(rows), clouds=count, threads=threads, repeats=repeats)
 
 
 @app.command()
@@ -181,11 +216,11 @@ def profile(
 
     if form not in ("plain", "fast", "both"):
         raise ConfigError(f"no form {form!r}", field="form", expected="plain, fast or both")
-    names = _parse_networks(networks)
+    names = parse_networks(networks)
     clouds = simulated_clouds(batch, points).first_points(points)
     with progress_bar("profile") as progress:
         rows = measure_profile(names, profiled_forms(form), clouds, batch, threads, progress)
-    _finish(out, "profile", rows, profile_table(rows, batch), points=points, batch=batch, threads=threads)
+    finish(out, "profile", rows, profile_table(rows, batch), points=points, batch=batch, threads=threads)
 
 
 @app.command()
@@ -195,11 +230,11 @@ def knn(out: Out, points: Points = _ALL_POINTS, repeats: Repeats = 5, threads: T
     from benchmarks.neighbours import measure_neighbours, neighbours_table
     from doorstate.cli.progress import progress_bar
 
-    numbers_of_points = _parse_points(points)
+    numbers_of_points = parse_points(points)
     with progress_bar("knn") as progress:
         clouds = simulated_clouds(1, max(numbers_of_points))
         rows = measure_neighbours(clouds, numbers_of_points, repeats, threads, progress)
-    _finish(out, "knn", rows, neighbours_table(rows), threads=threads, repeats=repeats)
+    finish(out, "knn", rows, neighbours_table(rows), threads=threads, repeats=repeats)
 
 
 @app.command()
@@ -223,12 +258,12 @@ def service(
     from doorstate._jobs import default_workers
     from doorstate.cli.progress import progress_bar
 
-    numbers_of_clients, workers = _parse_integers("clients", clients, 1), workers or default_workers()
+    numbers_of_clients, workers = parse_integers("clients", clients, 1), workers or default_workers()
     options = ["--network", network, "--workers", str(workers)]
     options += [] if points is None else ["--points", str(points)]
     with progress_bar("service") as progress:
         rows = measure_service(numbers_of_clients, seconds, options, progress)
-    _finish(
+    finish(
         out,
         "service",
         rows,
@@ -253,54 +288,6 @@ def main() -> None:
 def _write_option(name: str, value: object) -> str:
     option = f"--{name.replace('_', '-')}"
     return option if value is None else f"{option} {value}"
-
-
-def _parse_networks(text: str) -> list[str]:
-    from doorstate.networks import list_networks, network_class
-
-    names = list_networks() if text == "all" else [name.strip() for name in text.split(",")]
-    for name in names:
-        network_class(name)  # raises for an unknown name
-    return names
-
-
-def _parse_points(text: str) -> list[int]:
-    return _parse_integers("points", text, 128)
-
-
-def _parse_integers(option: str, text: str, minimum: int) -> list[int]:
-    words = [word.strip() for word in text.split(",")]
-    if not all(word.isdecimal() and int(word) >= minimum for word in words):
-        raise ConfigError(
-            f"cannot use {text!r}",
-            field=option,
-            expected=f"whole numbers of {minimum} or more, separated by commas",
-        )
-    return [int(word) for word in words]
-
-
-def _settings(**options: Any) -> dict[str, Any]:
-    """Return everything that results depend on: machine, versions and options."""
-    from doorstate._environment import describe_environment
-
-    return describe_environment() | options
-
-
-def _finish(out: Path, name: str, rows: list[dict[str, Any]], table: Table, **options: Any) -> None:
-    """Store and print the results of a benchmark that is measured as a whole."""
-    from benchmarks.store import save_rows
-
-    save_rows(out, name, _settings(**options), rows, table)
-    _print(table, out / f"{name}.md")
-
-
-def _print(table: Table, path: Path, remarks: Sequence[str] = ()) -> None:
-    from doorstate.cli.console import print_table, stdout
-
-    print_table(table.title, table.columns, table.rows)
-    for remark in remarks:
-        stdout.print(remark, soft_wrap=True)
-    stdout.print(f"stored in {path} and {path.with_suffix('.json').name}", soft_wrap=True)
 
 
 if __name__ == "__main__":

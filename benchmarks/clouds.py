@@ -29,6 +29,12 @@ def raw_cloud() -> Points:
     return replay(draw_rows(PRESETS["ogurob"], 0, PRESETS["ogurob"].indices(3)[1])[1]).points
 
 
+def sensor_cloud(preset: str, sensor: str) -> Points:
+    """Return one simulated organized cloud (480, 640, 3) of a preset, with the noise of a sensor."""
+    row = draw_rows(PRESETS[preset], 0, 0)[0]
+    return replay(row.model_copy(update={"sensor": sensor})).points
+
+
 def raw_clouds(count: int) -> list[Points]:
     """Return simulated organized clouds of doors in all states, from poses all over the room."""
     return [replay(row).points for row in reference_rows(count)]

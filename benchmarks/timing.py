@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from statistics import median
-from types import ModuleType
 from typing import Any
 from unittest.mock import patch
 
@@ -39,9 +38,9 @@ def median_seconds(step: Callable[[], object], warm_up: bool = True) -> float:
 
 
 @contextmanager
-def timed_calls(module: ModuleType, name: str) -> Iterator[list[float]]:
-    """Yield a list that receives the milliseconds of every call of one function through a module."""
-    function, durations_ms = getattr(module, name), []
+def timed_calls(owner: object, name: str) -> Iterator[list[float]]:
+    """Yield a list that receives the milliseconds of every call of one function through a module or class."""
+    function, durations_ms = getattr(owner, name), []
 
     def timed(*arguments: Any, **options: Any) -> Any:
         started = time.perf_counter()
@@ -49,7 +48,7 @@ def timed_calls(module: ModuleType, name: str) -> Iterator[list[float]]:
         durations_ms.append((time.perf_counter() - started) * 1000)
         return result
 
-    with patch.object(module, name, timed):
+    with patch.object(owner, name, timed):
         yield durations_ms
 
 

@@ -170,6 +170,29 @@ def test_latency_is_the_sum_of_its_stages(tmp_path: Path) -> None:
         assert f"| {row['network']} | {row['runtime']} | {row['sampling']} | 128 | 1 |" in markdown
 
 
+def test_time_to_every_door_is_the_sum_of_its_stages(tmp_path: Path) -> None:
+    few = ("--network", "pointnet", "--candidates", "1,3", "--threads", "1", "--repeats", "1")
+    code, _, errors = run("doorways", "--out", tmp_path, *few)
+    assert (code, errors) == (0, "")
+    settings, rows, markdown = read_results(tmp_path, "doorways")
+    assert settings["weights"] == "untrained pointnet"
+    assert [(row["cloud"], row["runtime"], row["candidates"]) for row in rows] == [
+        (cloud, runtime, candidates)
+        for cloud in ("varied", "corridor")
+        for runtime in ("torch", "onnxruntime")
+        for candidates in (1, 3)
+    ]
+    for row in rows:
+        stages = {name: stage["median_ms"] for name, stage in row["stages"].items()}
+        total, processor = stages.pop("total"), stages.pop("processor")
+        assert 1 <= row["doors"] <= row["candidates"]
+        assert all(
+            duration_ms > 0 for duration_ms in (*stages.values(), *row["check_ms"].values(), processor)
+        )
+        assert sum(stages.values()) == pytest.approx(total)
+        assert f"| {row['cloud']} | {row['runtime']} | 1 | {row['candidates']} | {row['doors']} |" in markdown
+
+
 def test_busy_has_a_row_for_every_form_and_number_of_processes(tmp_path: Path) -> None:
     few = ("--runtimes", "onnxruntime", "--threads", "1,2", "--processes", "0,1", "--repeats", "1")
     assert run("busy", "--out", tmp_path, *few)[0] == 0
@@ -221,6 +244,7 @@ def test_knn_measures_three_methods(tmp_path: Path) -> None:
         (("networks", "--networks", "pontnet"), "unknown network 'pontnet'; did you mean 'pointnet'?"),
         (("networks", "--points", "64"), "--points"),
         (("profile", "--form", "quick"), "--form"),
+        (("doorways", "--candidates", "0"), "--candidates"),
     ],
 )
 def test_wrong_options_are_reported_in_one_line(
