@@ -73,14 +73,22 @@ def gazebo_frames() -> Iterator[Example]:
     """Yield the twenty frames without noise that Gazebo rendered."""
     with np.load(GAZEBO / "depth.npz") as stored:
         depth_m = stored["depth"]
-    for image, frame in zip(
-        depth_m, json.loads((GAZEBO / "scenes.json").read_text(encoding="utf-8")), strict=True
-    ):
+    for image, frame in zip(depth_m, _gazebo_scenes(), strict=True):
         camera = frame["intrinsics"]
         intrinsics = Intrinsics(
             camera["width"], camera["height"], camera["f"], camera["f"], camera["cx"], camera["cy"]
         )
         yield frame["state"], level(depth_to_points(image, intrinsics), frame["camera"]["pitch"])
+
+
+def gazebo_heights_m() -> list[float]:
+    """Return the heights of the cameras of these frames above the floor."""
+    return [frame["camera"]["z"] for frame in _gazebo_scenes()]
+
+
+def _gazebo_scenes() -> list[dict[str, Any]]:
+    scenes: list[dict[str, Any]] = json.loads((GAZEBO / "scenes.json").read_text(encoding="utf-8"))
+    return scenes
 
 
 def trained_presets(trained_on: str) -> list[str]:

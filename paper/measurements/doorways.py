@@ -94,8 +94,16 @@ def simulated_views(scenes: int, progress: Progress, seed: int = SEED) -> Iterat
 
 
 def visible_doors(row: Row) -> list[TrueDoor]:
-    """Return the doors that should be found: of their leaf, frame or opening at least 1500 pixels are visible."""
-    return [door for door in true_doors(row) if door.visible_px.total >= VISIBLE_PX]
+    """Return the doors that should be found: at least 1500 pixels see their leaf, their frame or into their opening.
+
+    Nothing is seen of an opening beyond the range of the camera.
+    """
+    return [door for door in true_doors(row) if _seen_px(door, row.camera.max_depth_m) >= VISIBLE_PX]
+
+
+def _seen_px(door: TrueDoor, range_m: float) -> int:
+    seen = door.visible_px
+    return seen.leaf + seen.frame + (seen.opening if door.x_m <= range_m else 0)
 
 
 def gap_to(door: TrueDoor, place: Placed) -> tuple[float, float]:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import product
 from typing import NamedTuple
 
 import pandas as pd
@@ -12,7 +13,7 @@ from doorstate._jobs import Progress
 from doorstate.evaluation.table import Table, count_column, label_column, text_column
 from doorstate.inference.predictor import Predictor
 
-from ..answers import gazebo_frames
+from ..answers import gazebo_frames, gazebo_heights_m
 from .leveling import tilted
 from .words import count_words
 
@@ -30,6 +31,7 @@ class TiltedAnswer(NamedTuple):
     frame: int
     roll_deg: float
     pitch_deg: float
+    is_height_known: bool  # of the camera
     state: str
     predicted: str | None
     reason: str  # code; empty with a state
@@ -38,29 +40,39 @@ class TiltedAnswer(NamedTuple):
 def measure_tilted_answers(predictor: Predictor, progress: Progress) -> list[TiltedAnswer]:
     """Return the answers for all frames with all tilts, which the predictor is not told."""
     answers = []
-    frames = list(gazebo_frames())
-    for number, (state, level) in enumerate(frames):
-        for roll_deg, pitch_deg in TILTS:
-            prediction = predictor(tilted(level, roll_deg, pitch_deg, None).points)
+    frames = list(zip(gazebo_frames(), gazebo_heights_m(), strict=False))
+    for number, ((state, level), height_m) in enumerate(frames):
+        for (roll_deg, pitch_deg), is_height_known in product(TILTS, (False, True)):
+            cloud = tilted(level, roll_deg, pitch_deg, None).points
+            prediction = predictor(cloud, camera_height_m=height_m if is_height_known else None)
             reason = "" if prediction.abstention is None else prediction.abstention.code
-            answers.append(TiltedAnswer(number, roll_deg, pitch_deg, state, prediction.state, reason))
+            answers.append(
+                TiltedAnswer(number, roll_deg, pitch_deg, is_height_known, state, prediction.state, reason)
+            )
         progress(number + 1, len(frames))
     return answers
 
 
 def tilted_answers_table(answers: Sequence[TiltedAnswer]) -> Table:
-    """Return one row per tilt."""
-    level = {answer.frame: answer for answer in answers if (answer.roll_deg, answer.pitch_deg) == TILTS[0]}
+    """Return one row per tilt, with and without the height of the camera."""
+    level = {
+        (answer.frame, answer.is_height_known): answer.predicted
+        for answer in answers
+        if not answer.roll_deg and not answer.pitch_deg
+    }
     lines = []
-    for roll_deg, pitch_deg in TILTS:
-        of_tilt = [a for a in answers if (a.roll_deg, a.pitch_deg) == (roll_deg, pitch_deg)]
+    for is_height_known, (roll_deg, pitch_deg) in product((False, True), TILTS):
+        of_tilt = [answer for answer in answers if answer[1:4] == (roll_deg, pitch_deg, is_height_known)]
         lines.append(
             {
                 "tilt": f"roll {roll_deg:g}" if roll_deg else f"pitch {pitch_deg:g}",
+                "height": "given" if is_height_known else "not given",
                 "right": sum(answer.predicted == answer.state for answer in of_tilt),
                 "wrong": sum(answer.predicted not in (answer.state, None) for answer in of_tilt),
                 "silent": sum(answer.predicted is None for answer in of_tilt),
-                "changed": sum(answer.predicted != level[answer.frame].predicted for answer in of_tilt),
+                "changed": sum(
+                    answer.predicted != level[answer.frame, is_height_known] for answer in of_tilt
+                ),
                 "reasons": count_words(answer.reason for answer in of_tilt if answer.predicted is None),
             }
         )
@@ -69,12 +81,13 @@ def tilted_answers_table(answers: Sequence[TiltedAnswer]) -> Table:
         pd.DataFrame(lines),
         [
             label_column("tilt", "tilt, deg"),
+            label_column("height", "height of the camera"),
             count_column("right", "right state"),
             count_column("wrong", "wrong state"),
             count_column("silent", "no state"),
             count_column("changed", "other answer than without tilt"),
             text_column("reasons"),
         ],
-        note=f"{len(level)} frames that Gazebo rendered. Level clouds are turned into the frame of a camera that looks "
-        "down (pitch) or is turned clockwise about its axis (roll); the tilt is told from the cloud, zero too.",
+        note=f"{len(level) // 2} frames that Gazebo rendered. Level clouds are turned into the frame of a camera that "
+        "looks down (pitch) or is turned clockwise about its axis (roll); the tilt is told from the cloud, zero too.",
     )

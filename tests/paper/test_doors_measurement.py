@@ -8,7 +8,7 @@ from itertools import islice
 from pathlib import Path
 
 import pytest
-from paper.answers import gazebo_frames
+from paper.answers import gazebo_frames, gazebo_heights_m
 from paper.measurements import doorways, tilted_answers
 from paper.measurements.__main__ import app
 from paper.measurements.doors import (
@@ -113,12 +113,14 @@ def test_frames_are_answered_by_preset_and_sensor(monkeypatch: pytest.MonkeyPatc
 
 def test_a_tilt_does_not_change_what_is_always_closed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tilted_answers, "gazebo_frames", lambda: islice(gazebo_frames(), 1, 2))
-    answers = tilted_answers.measure_tilted_answers(_always_closed(60), no_progress)
-    assert len(answers) == 7
+    monkeypatch.setattr(tilted_answers, "gazebo_heights_m", lambda: gazebo_heights_m()[1:2])
+    answers = tilted_answers.measure_tilted_answers(_always_closed(120), no_progress)
+    assert len(answers) == 2 * 7
     assert {answer.predicted for answer in answers} == {"closed"}
     rows = tilted_answers.tilted_answers_table(answers).rows
-    assert [row[0] for row in rows][::3] == ["pitch 0", "pitch 30", "roll 30"]
-    assert {row[3:] for row in rows} == {("0", "0", "–")}
+    assert [row[0] for row in rows[:7]][::3] == ["pitch 0", "pitch 30", "roll 30"]
+    assert [row[1] for row in rows] == ["not given"] * 7 + ["given"] * 7
+    assert {row[4:] for row in rows} == {("0", "0", "–")}
 
 
 def test_weights_for_whole_clouds_are_refused(tmp_path: Path) -> None:
