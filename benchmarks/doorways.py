@@ -50,7 +50,7 @@ _STAGES: dict[str, tuple[object, str]] = {
     "crops": (doorway_predictor, "crop_cloud"),
     "network": (doorway_predictor, "run_by_size"),
     "decide": (doorway_predictor, "decide_doors"),
-    "check": (Gate, "check_doorway"),
+    "check": (Gate, "check_doorways"),
 }
 STAGES = (*_STAGES, "other", "total", "processor")
 _EACH = ("crops", "check")  # called for each candidate or door
@@ -193,7 +193,7 @@ def _stages_of_call(measured: DoorwayPredictor, cloud: Points) -> dict[str, floa
         processor_ms = (time.process_time() - started) * 1000
     stages = {stage: sum(durations_ms) for stage, durations_ms in times.items()}
     total = prediction.milliseconds
-    numbers = {"candidates": len(times["crops"]), "doors": len(times["check"])}
+    numbers = {"candidates": len(times["crops"]), "doors": len(prediction.doors)}
     sums = {"other": total - sum(stages.values()), "total": total, "processor": processor_ms}
     return stages | sums | numbers
 
@@ -213,8 +213,8 @@ def _measure_checks(cloud: Points, repeats: int) -> dict[str, float]:
         door = Door(
             best.x_m, best.y_m, best.yaw_deg, best.width_m, DoorState(state), floor_z_m=best.floor_z_m
         )
-        with timed_calls(Gate, "check_doorway") as durations_ms:
+        with timed_calls(Gate, "check_doorways") as durations_ms:
             for _ in range(repeats + 1):
-                DEFAULT_GATE.check_doorway(points, door)
+                DEFAULT_GATE.check_doorways(points, [door])
         checks_ms[state] = float(np.median(durations_ms[1:]))
     return checks_ms

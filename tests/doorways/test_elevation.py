@@ -6,7 +6,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from doorstate.doorways.elevation import COLUMN_M, NUM_ROWS, RELIEF_M, ROW_M, Elevation, wall_elevation
+from doorstate.doorways.elevation import (
+    COLUMN_M,
+    NUM_ROWS,
+    RELIEF_M,
+    ROW_M,
+    Elevation,
+    SightLines,
+    wall_elevation,
+)
 from doorstate.doorways.plan_lines import Line
 from doorstate.doorways.walls import Wall
 
@@ -39,7 +47,7 @@ def test_the_elevation_equals_a_loop_over_all_points(turn_deg: float) -> None:
     normal, along = np.array([np.cos(turn), np.sin(turn)]), np.array([-np.sin(turn), np.cos(turn)])
     wall = Wall(Line(2.0 * normal, along), first_m=-1.2, last_m=0.7, area_m2=3.0)
     points = np.random.default_rng(0).uniform((-1, -4, -1), (5, 4, 2), (4000, 3)).astype(np.float32)
-    elevation = wall_elevation(wall, points, _FLOOR_M)
+    elevation = wall_elevation(wall, SightLines.to(points), _FLOOR_M)
     plain = _plain(wall, points, _FLOOR_M, elevation)
     counts = np.stack([elevation.on_wall, elevation.through, elevation.hidden], axis=-1)
     means = np.stack([elevation.relief_m, elevation.behind_m, elevation.before_m], axis=-1)
@@ -54,7 +62,7 @@ def test_points_before_on_and_behind_a_wall() -> None:
     # Sight lines to the middle of a cell, 1 m above the floor and 0.52 m to the left.
     cell = np.array([2.0, 0.52, 0.05], np.float32)
     points = np.stack([0.5 * cell, cell, 2.0 * cell])
-    elevation = wall_elevation(_AHEAD, points, _FLOOR_M)
+    elevation = wall_elevation(_AHEAD, SightLines.to(points), _FLOOR_M)
     column, row = int((0.52 - elevation.first_m) / COLUMN_M), round(1.0 / ROW_M)
     assert elevation.on_wall.shape[1] == NUM_ROWS
     assert elevation.on_wall[column, row] == elevation.through[column, row] == 1
@@ -66,5 +74,5 @@ def test_points_before_on_and_behind_a_wall() -> None:
 
 
 def test_a_wall_without_points_is_empty() -> None:
-    elevation = wall_elevation(_AHEAD, np.empty((0, 3), np.float32), _FLOOR_M)
+    elevation = wall_elevation(_AHEAD, SightLines.to(np.empty((0, 3), np.float32)), _FLOOR_M)
     assert elevation.seen.sum() == 0

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from doorstate.doorways.plan_lines import Line, fit_line, strongest_line
+from tests.doorways import plain_walls
 
 DIAGONAL = Line(np.array([2.0, 0.0]), np.array([0.6, 0.8]))
 
@@ -44,3 +45,14 @@ def test_foot_and_crossing_are_on_the_line() -> None:
     np.testing.assert_allclose(DIAGONAL.foot(np.array([2.8, -0.6])), [2.0, 0.0], atol=1e-12)
     across = Line(np.array([0.0, 1.6]), np.array([1.0, 0.0]))
     np.testing.assert_allclose(DIAGONAL.crossing(across), [3.2, 1.6])
+
+
+@pytest.mark.parametrize("has_weights", [False, True])
+def test_a_line_of_least_squares_equals_that_of_the_covariance(has_weights: bool) -> None:
+    rng = np.random.default_rng(0)
+    for count in (2, 3, 40, 700):
+        points = rng.normal(size=(count, 2)) @ rng.normal(size=(2, 2))
+        weights = rng.random(count) if has_weights else None
+        line, plain = fit_line(points, weights), plain_walls.fit_line(points, weights)
+        assert line.centre.tolist() == plain.centre.tolist()
+        assert line.direction.tolist() == plain.direction.tolist()

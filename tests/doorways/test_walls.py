@@ -8,7 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from doorstate.doorways import walls as module
 from doorstate.doorways.walls import find_walls, occupied_cells
+from tests.doorways import plain_walls
 
 
 def _wall_points(
@@ -64,3 +66,32 @@ def test_cells_count_height_not_points() -> None:
     places_m, heights_m = occupied_cells(_wall_points(90, 2.0, 0.0, 0.5))
     assert len(places_m) == len(heights_m)
     assert heights_m.max() == pytest.approx(2.0, abs=0.11)
+
+
+def test_cells_equal_those_of_a_loop_over_all_points() -> None:
+    points = np.concatenate([_wall_points(70, 2.0, 0.0, 0.9), _wall_points(95, 3.0, -1.0, 0.4, seed=1)])
+    places_m, heights_m = occupied_cells(points)
+    plain_m, plain_heights_m = plain_walls.occupied_cells(points)
+    assert heights_m.tolist() == plain_heights_m.tolist()
+    np.testing.assert_allclose(places_m, plain_m, rtol=0, atol=1e-9)
+
+
+@given(st.integers(3, 30), st.integers(0, 1000))
+def test_columns_of_a_wall_equal_those_of_a_loop_over_all_pairs(count: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    s = np.arange(count) * 0.05 - 0.7
+    d = rng.choice([0.0, 0.06], count) + 0.1 * s + rng.normal(0, 0.004, count)
+    best = module._best_columns(s, d)
+    plain = plain_walls.best_columns(s, d)
+    assert (np.zeros(count, dtype=bool) if best is None else best).tolist() == plain.tolist()
+
+
+def test_columns_have_the_median_depth_of_their_points() -> None:
+    rng = np.random.default_rng(0)
+    along_m, behind_m = rng.uniform(-1, 1, 900), rng.uniform(-0.12, 0.12, 900)
+    middles_m, depths_m = module._columns(along_m, behind_m)
+    number = ((along_m - along_m.min()) / 0.05).astype(int)
+    for middle_m, depth_m in zip(middles_m, depths_m, strict=True):
+        own = np.sort(behind_m[number == round((middle_m - along_m.min()) / 0.05 - 0.5)])
+        assert depth_m == own[len(own) // 2]
+    assert len(middles_m) == 40

@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -29,7 +30,7 @@ _OPEN_WITHOUT_LEAF = "02_open"  # seen along its wall
 def _check(made: HandMade, state: DoorState, cloud: Points | None = None) -> DoorwayCheck:
     true = made.doors[0]
     door = Door(true.x_m, true.y_m, true.yaw_deg, true.width_m, state, floor_z_m=made.floor_z_m)
-    return DEFAULT_GATE.check_doorway(made.points if cloud is None else cloud, door)
+    return DEFAULT_GATE.check_doorways(made.points if cloud is None else cloud, [door])[0]
 
 
 def _code(check: DoorwayCheck) -> str | None:
@@ -128,7 +129,7 @@ def test_a_door_out_of_view_is_refused() -> None:
     door = Door(
         true.x_m, true.y_m + 6, true.yaw_deg, true.width_m, DoorState.CLOSED, floor_z_m=made.floor_z_m
     )
-    assert _code(DEFAULT_GATE.check_doorway(made.points, door)) == "door_out_of_view"
+    assert _code(DEFAULT_GATE.check_doorways(made.points, [door])[0]) == "door_out_of_view"
 
 
 @pytest.mark.parametrize("kind", ["none", "rectangle", "random", "flat"])
@@ -136,7 +137,9 @@ def test_losses_do_not_silence_measured_doors(kind: str) -> None:
     rng = np.random.default_rng(0)
     refused, unseen = [], []
     for name, points, door in _frames():
-        check = DEFAULT_GATE.check_doorway(points if kind == "none" else _with_loss(points, rng, kind), door)
+        check = DEFAULT_GATE.check_doorways(
+            points if kind == "none" else _with_loss(points, rng, kind), [door]
+        )[0]
         refused += [name] if check.abstention is not None else []
         unseen += [name] if door.state is DoorState.OPEN and not check.leaf_seen else []
     assert set(refused) <= {_OPEN_WITHOUT_LEAF}
@@ -147,9 +150,19 @@ def test_closed_doors_of_gazebo_are_never_confirmed_as_open() -> None:
     for _, points, door in _frames():
         if door.state is DoorState.CLOSED:
             said = Door(door.x_m, door.y_m, door.yaw_deg, 0.9, DoorState.OPEN, floor_z_m=door.floor_z_m)
-            assert _code(DEFAULT_GATE.check_doorway(points, said)) == "opening_blocked"
+            assert _code(DEFAULT_GATE.check_doorways(points, [said])[0]) == "opening_blocked"
+
+
+def test_doors_are_checked_as_if_each_were_alone() -> None:
+    frames = _frames()
+    _, points, door = frames[0]
+    doors = [replace(door, state=state) for state in DoorState]
+    doors += [replace(door, y_m=door.y_m + 6), replace(door, state=None)]
+    together = DEFAULT_GATE.check_doorways(points, doors)
+    assert together == [DEFAULT_GATE.check_doorways(points, [door])[0] for door in doors]
+    assert len({_code(check) for check in together}) > 1
 
 
 def test_a_door_without_state_or_points_is_not_checked() -> None:
     door = Door(2.0, 0.0, 90.0, 0.9, None, floor_z_m=-1.0)
-    assert DEFAULT_GATE.check_doorway(np.ones((9, 3), np.float32), door) == DoorwayCheck(None)
+    assert DEFAULT_GATE.check_doorways(np.ones((9, 3), np.float32), [door])[0] == DoorwayCheck(None)

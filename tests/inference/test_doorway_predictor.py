@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ import torch
 from doorstate.clouds.leveling import Leveling
 from doorstate.clouds.vertical import LevelingRefusal
 from doorstate.errors import CloudContentError, ConfigError
+from doorstate.inference.door import Door
 from doorstate.inference.doorway_predictor import MAX_DOORS, DoorwayPredictor
 from doorstate.inference.gate import DoorwayCheck, Gate
 from doorstate.inference.known import DoorHint
@@ -197,9 +199,9 @@ def test_the_gate_is_asked_about_every_door_with_a_state(
     asked: list[float] = []
 
     class Strict(Gate):
-        def check_doorway(self, cloud: Points, door: object) -> DoorwayCheck:
-            asked.append(door.distance_m)  # type: ignore[attr-defined]
-            return DoorwayCheck(None, leaf_seen=len(asked) == 1)
+        def check_doorways(self, cloud: Points, doors: Sequence[Door]) -> list[DoorwayCheck]:
+            asked.extend(door.distance_m for door in doors)
+            return [DoorwayCheck(None, leaf_seen=number == 0) for number in range(len(doors))]
 
     predictor = scripted_predictor(
         monkeypatch, [AHEAD, LEFT, RIGHT], [outputs("closed"), outputs("closed"), outputs("closed", 0.2)]

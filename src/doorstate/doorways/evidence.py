@@ -8,13 +8,18 @@ that far or grazing walls, and rows out of view, are no holes.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from doorstate.doorways.doorway import Doorway
 from doorstate.doorways.elevation import ROW_M, Elevation, wall_elevation
+from doorstate.doorways.measured_view import MeasuredView
 from doorstate.doorways.plan_lines import Floats, Line
 from doorstate.doorways.walls import Wall
 
@@ -27,7 +32,6 @@ _MIN_EXPECTED = 6.0  # sight lines of a cell: one in 400 such cells is empty by 
 _BEFORE_M = (0.1, 1.0)  # floor before an opening
 _FLOOR_M = 0.1  # of a point to the height of the floor
 _MIN_FLOOR_POINTS = 8
-_RANGE_QUANTILES = (0.002, 0.995)
 # Largest difference between the depth of a flush cell and the median depth of the opening: at least the first, at most
 # the second, and between them three times the scatter of the wall on both sides.
 _FLUSH_M, _MAX_FLUSH_M = 0.05, 0.1
@@ -36,7 +40,7 @@ _SCATTERS = 3.0
 Cells = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class DoorwayEvidence:
     """Shares of the cells of an opening that are in view, and ranges about it; the first four shares sum to 1.
 
@@ -46,12 +50,7 @@ class DoorwayEvidence:
         through: share through which something farther behind was measured.
         hidden: share before which something stands.
         missing: share from which nothing came back.
-        flush: share in which a surface lies in one plane along the wall, as the wall itself or a closed leaf does.
-        rim_m: median range of the wall beside the opening; NaN if none was measured.
-        hole_m: least range of what surrounds the missing cells; NaN if none are missing.
-        nearest_m: least range in the cloud.
-        farthest_m: largest range in the cloud.
-        has_floor_before: True if the floor before the opening was measured.
+        about: cells about the opening.
     """
 
     in_view: float
@@ -59,46 +58,83 @@ class DoorwayEvidence:
     through: float
     hidden: float
     missing: float
-    flush: float
-    rim_m: float
-    hole_m: float
-    nearest_m: float
-    farthest_m: float
-    has_floor_before: bool
+    about: _About
+
+    @cached_property
+    def flush(self) -> float:
+        """Share in which a surface lies in one plane along the wall, as the wall itself or a closed leaf does."""
+        about = self.about
+        relief_m = np.where(about.lines[0] > 0, about.elevation.relief_m[about.stretch, _ROWS], np.nan)
+        return self.on_wall * _flush(relief_m, about.in_view, about.rims)
+
+    @cached_property
+    def rim_m(self) -> float:
+        """Median range of the wall beside the opening; NaN if none was measured."""
+        right, left = self.about.rims
+        return _median(self._ranges_m[right | left])
+
+    @cached_property
+    def hole_m(self) -> float:
+        """Least range of what surrounds the missing cells; NaN if none are missing."""
+        return _hole_range_m(self.about.is_missing, self._ranges_m)
+
+    @property
+    def nearest_m(self) -> float:
+        """Least range in the cloud."""
+        return self.about.view.range_limits_m[0]
+
+    @property
+    def farthest_m(self) -> float:
+        """Largest range in the cloud."""
+        return self.about.view.range_limits_m[1]
+
+    @cached_property
+    def has_floor_before(self) -> bool:
+        """True if the floor before the opening was measured."""
+        return _has_floor_before(self.about.view.points, self.about.doorway)
+
+    @cached_property
+    def _ranges_m(self) -> Cells:
+        about = self.about
+        return _ranges_m(about.elevation, about.wall, about.doorway.floor_z_m)[about.stretch, _ROWS]
 
 
-def find_evidence(points: NDArray[np.float32], doorway: Doorway) -> DoorwayEvidence:
+class _About(NamedTuple):
+    """Cells (columns, rows) of the wall about an opening."""
+
+    view: MeasuredView
+    doorway: Doorway
+    wall: Wall
+    elevation: Elevation
+    stretch: NDArray[np.bool_]  # columns of the elevation
+    lines: Cells  # (3, columns, rows) sight lines that end on the wall, behind and before it
+    rims: tuple[NDArray[np.bool_], NDArray[np.bool_]]  # columns to the right and left of the opening
+    in_view: Cells
+    is_missing: NDArray[np.bool_]
+
+
+def find_evidence(view: MeasuredView, doorway: Doorway) -> DoorwayEvidence:
     """Return what a cloud shows of a doorway.
 
     Args:
-        points: (N, 3) measured points, metres, level sensor frame.
+        view: points of the cloud.
         doorway: pose and width of the doorway.
     """
     wall, middle_m = _wall_of(doorway)
-    elevation = wall_elevation(wall, points, doorway.floor_z_m)
+    elevation = wall_elevation(wall, view.lines, doorway.floor_z_m)
     offsets_m = elevation.positions_m - middle_m
     half_m = doorway.width_m / 2
     stretch = np.abs(offsets_m) < half_m + _RIM_M
-    opening = np.abs(offsets_m[stretch]) < half_m - _EDGE_M
-    rims = [side * offsets_m[stretch] > half_m for side in (-1, 1)]
+    offsets_m = offsets_m[stretch]
+    opening = np.abs(offsets_m) < half_m - _EDGE_M
+    rims = (-offsets_m > half_m, offsets_m > half_m)
     kinds = np.stack([elevation.on_wall, elevation.through, elevation.hidden])[:, stretch, _ROWS]
     lines: Cells = kinds.astype(np.float64)
-    ranges_m = _ranges_m(elevation, wall, doorway.floor_z_m)[stretch, _ROWS]
     in_view, expected = _expected(lines.sum(axis=0), opening, rims)
     shares, is_missing = _shares(lines, expected, in_view, rims)
-    ranges = np.quantile(np.linalg.norm(points[:: max(1, len(points) // 4096)], axis=1), _RANGE_QUANTILES)
-    rim = ranges_m[rims[0] | rims[1]]
-    return DoorwayEvidence(
-        float(in_view[opening].mean()) if opening.any() else 0.0,
-        *shares,
-        flush=shares[0]
-        * _flush(np.where(lines[0] > 0, elevation.relief_m[stretch, _ROWS], np.nan), in_view, rims),
-        rim_m=_median(rim),
-        hole_m=_hole_range_m(is_missing, ranges_m),
-        nearest_m=float(ranges[0]),
-        farthest_m=float(ranges[1]),
-        has_floor_before=_has_floor_before(points, doorway),
-    )
+    share_in_view = float(in_view[opening].mean()) if opening.any() else 0.0
+    about = _About(view, doorway, wall, elevation, stretch, lines, rims, in_view, is_missing)
+    return DoorwayEvidence(share_in_view, *shares, about)
 
 
 def _wall_of(doorway: Doorway) -> tuple[Wall, float]:
@@ -128,7 +164,9 @@ def _ranges_m(elevation: Elevation, wall: Wall, floor_z_m: float) -> Cells:
     return ranges_m
 
 
-def _expected(seen: Cells, opening: NDArray[np.bool_], rims: list[NDArray[np.bool_]]) -> tuple[Cells, Cells]:
+def _expected(
+    seen: Cells, opening: NDArray[np.bool_], rims: Sequence[NDArray[np.bool_]]
+) -> tuple[Cells, Cells]:
     """Return the cells (columns, rows) of the opening that are in view, and the sight lines expected in each.
 
     Sight lines through a plane get fewer smoothly with its range, whatever they end on, so that those of the rims tell
@@ -156,17 +194,15 @@ def _row_density(rim: Cells) -> Cells:
     """Return the mean number of sight lines (rows) of the cells of a rim that were measured; 0 where too few were."""
     if len(rim) == 0:
         return np.zeros(rim.shape[1])
-    padded = np.pad(rim, ((0, 0), (1, 1)), mode="edge")
+    padded = np.concatenate([rim[:, :1], rim, rim[:, -1:]], axis=1)
     about = (padded[:, :-2] + padded[:, 1:-1] + padded[:, 2:]) / 3
-    filled = about > 0
-    density: Cells = np.where(
-        filled.sum(axis=0) >= 2, about.sum(axis=0) / np.maximum(filled.sum(axis=0), 1), 0
-    )
+    filled = np.count_nonzero(about, axis=0)
+    density: Cells = np.where(filled >= 2, about.sum(axis=0) / np.maximum(filled, 1), 0)
     return density
 
 
 def _shares(
-    kinds: Cells, expected: Cells, in_view: Cells, rims: list[NDArray[np.bool_]]
+    kinds: Cells, expected: Cells, in_view: Cells, rims: Sequence[NDArray[np.bool_]]
 ) -> tuple[tuple[float, float, float, float], NDArray[np.bool_]]:
     """Return the shares on the wall, through, hidden and missing, and the missing cells (columns, rows)."""
     is_missing = np.zeros(in_view.shape, dtype=bool)
@@ -189,7 +225,7 @@ def _shares(
     filled = counted & (totals > 0)
     weights = cells / cells[counted].sum()
     parts = [float((part / np.maximum(totals, 1) * weights)[filled].sum()) for part in pooled]
-    wide = np.kron(empty, np.ones((pool, pool), dtype=bool))[: seen.shape[0], : seen.shape[1]]
+    wide = empty.repeat(pool, axis=0).repeat(pool, axis=1)[: seen.shape[0], : seen.shape[1]]
     return (parts[0], parts[1], parts[2], float(weights[empty].sum())), wide & (in_view > 0) & (seen == 0)
 
 
@@ -199,7 +235,7 @@ def _filled_share(seen: Cells, pool: int) -> float:
     return float(filled.mean()) if filled.any() else 1.0
 
 
-def _flush(relief_m: Cells, in_view: Cells, rims: list[NDArray[np.bool_]]) -> float:
+def _flush(relief_m: Cells, in_view: Cells, rims: Sequence[NDArray[np.bool_]]) -> float:
     """Return the share of the cells with a surface in which it is as deep as the middle one of the opening."""
     depths_m = relief_m[(in_view > 0) & np.isfinite(relief_m)]
     if len(depths_m) == 0:
@@ -222,12 +258,16 @@ def _pooled(cells: Cells, pool: int) -> Cells:
     columns, rows = (-(-size // pool) for size in cells.shape)
     padded = np.zeros((columns * pool, rows * pool))
     padded[: cells.shape[0], : cells.shape[1]] = cells
-    sums: Cells = padded.reshape(columns, pool, rows, pool).sum(axis=(1, 3))
+    sums = np.zeros((columns, rows))
+    for i, j in product(range(pool), repeat=2):
+        sums += padded[i::pool, j::pool]
     return sums
 
 
 def _hole_range_m(is_missing: NDArray[np.bool_], ranges_m: Cells) -> float:
     """Return the median of the nearer half of the ranges of the cells beside missing ones."""
+    if not is_missing.any():
+        return math.nan
     padded = np.pad(is_missing, 1)
     beside = padded[:-2, 1:-1] | padded[2:, 1:-1] | padded[1:-1, :-2] | padded[1:-1, 2:]
     near_m = ranges_m[beside & ~is_missing]

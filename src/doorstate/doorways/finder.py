@@ -16,7 +16,7 @@ from doorstate.clouds.floor import lowest_z_m
 from doorstate.clouds.measured import is_measured
 from doorstate.doorways.column_scorer import ColumnScores, score_columns
 from doorstate.doorways.doorway import Doorway
-from doorstate.doorways.elevation import COLUMN_M, Elevation, wall_elevation
+from doorstate.doorways.elevation import COLUMN_M, Elevation, SightLines, wall_elevation
 from doorstate.doorways.plan_lines import Floats
 from doorstate.doorways.walls import Wall, find_walls
 from doorstate.types import Points
@@ -93,14 +93,16 @@ def thinned(cloud: Points) -> NDArray[np.float32]:
     """Return measured points (N, 3) of some rows and columns of an image, or of some points of a flat cloud."""
     step = math.ceil(math.sqrt(cloud.size / 3 / _MAX_POINTS)) if cloud.ndim == 3 else 1
     some = cloud[::step, ::step].reshape(-1, 3) if cloud.ndim == 3 else cloud
-    points = some[is_measured(some)]
+    points = some.take(np.flatnonzero(is_measured(some)), axis=0)
     return np.asarray(points[:: max(1, len(points) // _MAX_POINTS)], dtype=np.float32)
 
 
 def _survey(points: NDArray[np.float32], floor_m: float) -> list[tuple[Wall, Elevation]]:
     height_m = points[:, 2] - np.float32(floor_m)
-    upright = points[(height_m > _UPRIGHT_M[0]) & (height_m < _UPRIGHT_M[1])].astype(np.float64)
-    return [(wall, wall_elevation(wall, points, floor_m)) for wall in find_walls(upright)]
+    rows = np.flatnonzero((height_m > _UPRIGHT_M[0]) & (height_m < _UPRIGHT_M[1]))
+    upright = points.take(rows, axis=0).astype(np.float64)
+    lines = SightLines.to(points)
+    return [(wall, wall_elevation(wall, lines, floor_m)) for wall in find_walls(upright)]
 
 
 def _on_wall(wall: Wall, elevation: Elevation, floor_m: float, settings: FinderSettings) -> Iterator[Doorway]:

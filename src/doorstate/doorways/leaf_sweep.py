@@ -6,13 +6,14 @@ A leaf ends where a wall goes on. So what reaches beyond the leaf's free edge, o
 
 from __future__ import annotations
 
-import math
 from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from doorstate.doorways.doorway import Doorway
+from doorstate.doorways.measured_view import MeasuredView
+from doorstate.doorways.reach import Reach
 
 Hinge = Literal["left", "right"]
 Angles = tuple[float, ...]
@@ -28,12 +29,8 @@ _BEYOND_M = (0.15, 0.25)  # of the free edge
 _BESIDE = 2  # angles on each side of that of a wall
 _WALL_M = (-0.25, 0.15)  # beside the opening: the wall itself, which a leaf folded back lies on
 _MIN_WIDTH_M = 0.55  # of one leaf of double doors
-_RAY_TAN = 0.05  # side of the cells of the view
-_MAX_TAN = 2.0
-_NEARER_M = 0.15  # a sight line that ends so much nearer does not reach the leaf
 _MIN_CELLS = 10  # of the leaf, in view
 _OUTER, _MIN_OUTER_CELLS = 4, 5  # outer steps of the leaf, and least cells in view there: reveals have none
-_MAX_POINTS = 10_000
 
 
 class SeenLeaf(NamedTuple):
@@ -47,7 +44,7 @@ class SeenLeaf(NamedTuple):
 
 
 def sweep_leaf(
-    points: NDArray[np.float32],
+    view: MeasuredView,
     doorway: Doorway,
     angles_deg: Angles = OPEN_ANGLES_DEG,
     min_share: float = 0.7,
@@ -55,18 +52,16 @@ def sweep_leaf(
     """Return the leaf of which most was measured, or None if no leaf was.
 
     Args:
-        points: (N, 3) measured points, metres, level sensor frame.
+        view: points of the cloud.
         doorway: pose and width of the opening.
         angles_deg: opening angles to look at.
         min_share: least share of the cells of a leaf in view that were measured.
     """
-    points = points[:: max(1, len(points) // _MAX_POINTS)]
-    view = _farthest_m(points)
     widths_m = [doorway.width_m] + [doorway.width_m / 2] * (doorway.width_m >= 2 * _MIN_WIDTH_M)
-    occupied = _occupied(points, doorway)
+    occupied = _occupied(view, doorway)
     best: SeenLeaf | None = None
     for width_m in widths_m:
-        leaf = _best_leaf(doorway, width_m, np.asarray(angles_deg), occupied, view)
+        leaf = _best_leaf(doorway, width_m, np.asarray(angles_deg), occupied, view.reach)
         if leaf is not None and leaf.share >= min_share and (best is None or leaf.share > best.share):
             best = leaf
     return best
@@ -77,7 +72,7 @@ def _best_leaf(
     width_m: float,
     angles_deg: NDArray[np.float64],
     occupied: NDArray[np.bool_],
-    view: NDArray[np.float32],
+    reach: Reach,
 ) -> SeenLeaf | None:
     hinges, swings, angles = np.meshgrid((-1.0, 1.0), (-1.0, 1.0), np.radians(angles_deg), indexing="ij")
     along = np.concatenate([np.linspace(_STARTS, _STOPS, _STEPS) * width_m, width_m + np.asarray(_BEYOND_M)])
@@ -88,7 +83,9 @@ def _best_leaf(
     is_leaf = (np.arange(len(along)) < _STEPS)[:, None] & (levels < _LEAF_LEVELS)
     is_beyond = (np.arange(len(along)) >= _STEPS)[:, None] & (levels < _LEAF_LEVELS)
     is_above = (np.arange(len(along)) < _STEPS)[:, None] & (levels == _ABOVE_LEVEL)
-    in_view = _reach(doorway, x, y, view)
+    places = np.stack([x, y, np.zeros_like(x)], axis=-1).astype(np.float32)
+    heights_m = _LOWEST_M + (levels + 0.5) * _LEVEL_M + doorway.floor_z_m
+    in_view = reach.includes(doorway.to_sensor(places), heights_m.astype(np.float32))
     beside = (np.abs(x) > doorway.width_m / 2) & (y > _WALL_M[0]) & (y < _WALL_M[1])
     in_view &= ~beside[..., None]
     filled = _look_up(occupied, x, y) & in_view
@@ -128,15 +125,16 @@ def _half_m(doorway: Doorway) -> tuple[float, float]:
     return 1.5 * doorway.width_m + 0.4, doorway.width_m + 0.4
 
 
-def _occupied(points: NDArray[np.float32], doorway: Doorway) -> NDArray[np.bool_]:
+def _occupied(view: MeasuredView, doorway: Doorway) -> NDArray[np.bool_]:
     """Return the cells (x, y, level) of the doorway's frame with points in them or beside them in plan view."""
     half_x, half_y = _half_m(doorway)
     size = (int(2 * half_x / _SIDE_M) + 3, int(2 * half_y / _SIDE_M) + 3, _NUM_LEVELS)
     around = np.hypot(half_x, half_y)
-    near = (np.abs(points[:, 0] - np.float32(doorway.x_m)) < around) & (
-        np.abs(points[:, 1] - np.float32(doorway.y_m)) < around
+    x, y, _ = view.lines.ends_m
+    near = np.flatnonzero(
+        (np.abs(x - np.float32(doorway.x_m)) < around) & (np.abs(y - np.float32(doorway.y_m)) < around)
     )
-    x, y, z = doorway.to_doorway(points[near]).T
+    x, y, z = doorway.to_doorway(view.points.take(near, axis=0)).T
     column, row = ((x + half_x) / _SIDE_M).astype(np.int64) + 1, ((y + half_y) / _SIDE_M).astype(np.int64) + 1
     level = np.floor((z - _LOWEST_M) / _LEVEL_M).astype(np.int64)
     inside = (np.abs(x) < half_x) & (np.abs(y) < half_y) & (level >= 0) & (level < _NUM_LEVELS)
@@ -161,37 +159,3 @@ def _look_up(
         np.clip(column, 0, occupied.shape[0] - 1), np.clip(row, 0, occupied.shape[1] - 1)
     ]
     return found
-
-
-def _farthest_m(points: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return the depth along x (across, up) of the farthest point in each cell of the view; 0 where there is none."""
-    size = int(2 * _MAX_TAN / _RAY_TAN)
-    ahead = points[points[:, 0] > 0.05]
-    across, up = (_ray_cell(ahead[:, axis] / ahead[:, 0]) for axis in (1, 2))
-    inside = (across >= 0) & (across < size) & (up >= 0) & (up < size)
-    farthest = np.zeros(size * size, np.float32)
-    np.maximum.at(farthest, across[inside] * size + up[inside], ahead[inside, 0])
-    return farthest.reshape(size, size)
-
-
-def _ray_cell(tangents: NDArray[np.floating]) -> NDArray[np.int64]:
-    cells: NDArray[np.int64] = np.floor((np.clip(tangents, -10, 10) + _MAX_TAN) / _RAY_TAN).astype(np.int64)
-    return cells
-
-
-def _reach(
-    doorway: Doorway, x: NDArray[np.float64], y: NDArray[np.float64], view: NDArray[np.float32]
-) -> NDArray[np.bool_]:
-    """Return the places (..., level) of the doorway's frame that sight lines reach or pass."""
-    heights_m = _LOWEST_M + (np.arange(_NUM_LEVELS) + 0.5) * _LEVEL_M + doorway.floor_z_m
-    yaw = math.radians(doorway.yaw_deg)
-    forward = doorway.x_m + math.cos(yaw) * x - math.sin(yaw) * y
-    left = doorway.y_m + math.sin(yaw) * x + math.cos(yaw) * y
-    depth = np.maximum(forward, 0.05)
-    across = np.broadcast_to(_ray_cell(left / depth)[..., None], (*x.shape, _NUM_LEVELS))
-    up = _ray_cell(heights_m / depth[..., None])
-    size = len(view)
-    inside = (across >= 0) & (across < size) & (up >= 0) & (up < size) & (forward > 0.05)[..., None]
-    farthest = view[np.clip(across, 0, size - 1), np.clip(up, 0, size - 1)]
-    reached: NDArray[np.bool_] = inside & (farthest > (forward - _NEARER_M)[..., None])
-    return reached

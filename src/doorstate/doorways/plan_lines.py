@@ -99,8 +99,12 @@ def strongest_line(
 
 def fit_line(points: Floats, weights: Floats | None = None) -> Line:
     """Return the line with least squared distances to (N, 2) points."""
-    centre = np.average(points, axis=0, weights=weights)
-    scatter = np.cov((points - centre).T, aweights=weights, ddof=0)
+    weights = np.ones(len(points)) if weights is None else weights
+    total = weights.sum()
+    centre = (points * weights[:, None]).sum(axis=0) / total
+    offsets = (points - centre).T
+    offsets -= ((offsets * weights).sum(axis=1) / total)[:, None]
+    scatter = offsets @ (offsets * weights).T * (1 / total)
     return Line(centre, np.linalg.eigh(scatter)[1][:, 1])
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from doorstate.doorways.elevation import COLUMN_M, NUM_ROWS, RELIEF_M, ROW_M
+from doorstate.doorways.elevation import COLUMN_M, NUM_ROWS, RELIEF_M, ROW_M, crossed_cells
 from doorstate.types import Indices, Points
 
 _MAX_COLUMNS, _MAX_ROWS = round(0.2 / COLUMN_M), round(0.2 / ROW_M)
@@ -64,21 +64,18 @@ def fill_small_holes(points: Points, camera_m: Points) -> Filling:
 
 
 def _grid(points: Points, camera_m: NDArray[np.float64]) -> _Grid | None:
-    towards_m = camera_m[1] - points[:, 1].astype(np.float64)
-    ahead = np.flatnonzero(towards_m > 1e-3) if camera_m[1] > 0 else np.empty(0, np.int64)
-    if len(ahead) == 0:
+    if camera_m[1] <= 0:
         return None
-    share = camera_m[1] / towards_m[ahead]
-    crossings = (camera_m + (points[ahead] - camera_m) * share[:, None])[:, [0, 2]]
-    low_m = np.array([-_HALF_WIDTH_M, 0.0])
-    cell = np.floor((crossings - low_m) / (COLUMN_M, ROW_M)).astype(np.int64)
-    shape = (round(2 * _HALF_WIDTH_M / COLUMN_M), NUM_ROWS)
-    inside = ((cell >= 0) & (cell < shape)).all(axis=1)
-    number = cell[inside, 0] * shape[1] + cell[inside, 1]
-    order = np.argsort(number, kind="stable")
-    counts = np.bincount(number, minlength=shape[0] * shape[1])
+    x, y, z = points.T.astype(np.float64, order="C") - camera_m[:, None]
+    columns = round(2 * _HALF_WIDTH_M / COLUMN_M)
+    corner_m = (-_HALF_WIDTH_M - camera_m[0], -camera_m[2])
+    number, cell = crossed_cells((x, -y, z), 1e-3, float(camera_m[1]), corner_m, columns)
+    if len(number) == 0:
+        return None
+    order = np.argsort(cell, kind="stable")
+    counts = np.bincount(cell, minlength=columns * NUM_ROWS)
     starts = np.concatenate([[0], np.cumsum(counts)])
-    return _Grid(low_m, counts.reshape(shape), ahead[inside][order], starts)
+    return _Grid(np.array([-_HALF_WIDTH_M, 0.0]), counts.reshape(columns, NUM_ROWS), number[order], starts)
 
 
 def _small_holes(counts: NDArray[np.int64]) -> list[list[tuple[int, int]]]:

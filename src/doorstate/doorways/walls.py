@@ -8,10 +8,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from doorstate.doorways.plan_lines import Floats, Line, fit_line
+from doorstate.types import Indices
 
 _CELL_M = 0.05
 _LEVEL_M = 0.1  # heights are measured or not in steps of this
@@ -57,6 +60,7 @@ def find_walls(points: Floats) -> list[Wall]:
         points: (N, 3) metres, sensor frame, z up, without floor and ceiling.
     """
     cells_m, heights_m = occupied_cells(points)
+    plan = np.ascontiguousarray(points[:, :2].T)
     if len(cells_m) < 2:
         return []
     walls: list[Wall] = []
@@ -70,7 +74,7 @@ def find_walls(points: Floats) -> list[Wall]:
         proposed = free & (np.abs(first.behind_m(cells_m)) <= _NEAR_M)
         if heights_m[proposed].sum() * _CELL_M < _MIN_AREA_M2:
             break
-        line = _refined(first, points)
+        line = _refined(first, plan)
         on_line = free & (np.abs(line.behind_m(cells_m)) <= _NEAR_M)
         along_m = line.along_m(cells_m[on_line])
         area_m2 = _area_m2(along_m, heights_m[on_line])
@@ -79,7 +83,7 @@ def find_walls(points: Floats) -> list[Wall]:
             continue
         free &= ~on_line
         # A leaf a few centimetres deeper is a wall of its own.
-        points = points[np.abs(line.behind_m(points[:, :2])) > 2 * _INLIER_M]
+        plan = plan[:, np.abs(_across_m(line, plan)) > 2 * _INLIER_M]
         walls.append(Wall(line, float(along_m.min()), float(along_m.max()), area_m2))
     return sorted(walls, key=lambda wall: -wall.area_m2)
 
@@ -98,17 +102,21 @@ def occupied_cells(points: Floats) -> tuple[Floats, Floats]:
     """Return the mean places (K, 2) of cells in plan view with upright things, and their measured heights (K,)."""
     if len(points) == 0:
         return np.empty((0, 2)), np.empty(0)
-    low = points[:, :2].min(axis=0)
-    cell = ((points[:, :2] - low) / _CELL_M).astype(np.int64)
-    shape = cell.max(axis=0) + 1
-    number = cell[:, 0] * shape[1] + cell[:, 1]
-    level = ((points[:, 2] - points[:, 2].min()) / _LEVEL_M).astype(np.int64)
+    x, y, z = np.ascontiguousarray(points.T)
+    low = np.array([x.min(), y.min()])
+    column, row = ((axis - start) / _CELL_M for axis, start in zip((x, y), low, strict=True))
+    column, row = column.astype(np.int64), row.astype(np.int64)
+    columns, rows = int(column.max()) + 1, int(row.max()) + 1
+    number = column * rows + row
+    level = ((z - z.min()) / _LEVEL_M).astype(np.int64)
     levels = int(level.max()) + 1
-    filled = np.bincount(number * levels + level, minlength=int(shape[0] * shape[1]) * levels) > 0
-    heights_m = filled.reshape(-1, levels).sum(axis=1) * _LEVEL_M
-    count = np.bincount(number, minlength=int(shape[0] * shape[1]))
+    filled = np.zeros(columns * rows * levels, dtype=bool)
+    filled[number * levels + level] = True
+    num_levels = np.bincount(np.flatnonzero(filled) // levels, minlength=columns * rows)
+    heights_m = num_levels.astype(np.float64) * _LEVEL_M
+    count = np.bincount(number, minlength=columns * rows)
     kept = np.flatnonzero(heights_m >= _MIN_HEIGHT_M)
-    sums = [np.bincount(number, points[:, axis], len(count))[kept] for axis in range(2)]
+    sums = [np.bincount(number, axis, len(count))[kept] for axis in (x, y)]
     return np.stack(sums, axis=1) / count[kept, None], heights_m[kept]
 
 
@@ -128,44 +136,81 @@ def _strongest(cells_m: Floats, heights_m: Floats, normals: Floats) -> Line:
     return _fit(cells_m[near], heights_m[near])
 
 
-def _refined(line: Line, points: Floats) -> Line:
+def _refined(line: Line, plan: Floats) -> Line:
     """Return the line on which most columns of the points near a first line lie.
 
     A leaf that lies deeper than its wall would turn a line of least squares.
+
+    Args:
+        line: first line.
+        plan: (2, N) places of points.
     """
-    behind_m = line.behind_m(points[:, :2])
+    behind_m = _across_m(line, plan)
     near = np.flatnonzero(np.abs(behind_m) <= _REACH_M)
     near = near[:: max(1, len(near) // _MAX_POINTS)]
-    along_m, behind_m = line.along_m(points[near, :2]), behind_m[near]
     if len(near) < 2:
         return line
-    column = ((along_m - along_m.min()) / _COLUMN_M).astype(np.int64)
-    order = np.lexsort((behind_m, column))
-    starts = np.flatnonzero(np.diff(column[order], prepend=-1))
-    sizes = np.diff(starts, append=len(order))
-    middles = order[starts + sizes // 2]
-    enough = sizes >= 3
-    s, d = along_m[order[starts]][enough], behind_m[middles][enough]
-    s = (np.floor((s - along_m.min()) / _COLUMN_M) + 0.5) * _COLUMN_M + along_m.min()
+    behind_m = behind_m[near]
+    along_m = line.direction @ (plan[:, near] - line.centre[:, None])
+    s, d = _columns(along_m, behind_m)
     if len(s) < 3:
         return line
-    first, second = np.triu_indices(len(s), 1)
-    step = max(1, len(first) * len(s) // _MAX_TRIALS)
-    first, second = first[::step], second[::step]
-    slopes = (d[second] - d[first]) / (s[second] - s[first])
-    flat = np.abs(slopes) <= math.tan(math.radians(_MAX_TURN_DEG))
-    if not flat.any():
+    best = _best_columns(s, d)
+    if best is None:
         return line
+    return _fit(line.centre + s[best, None] * line.direction + d[best, None] * line.normal)
+
+
+def _columns(along_m: Floats, behind_m: Floats) -> tuple[Floats, Floats]:
+    """Return the middles along a line of the columns of points with three or more, and their median depths."""
+    first_m = along_m.min()
+    column = ((along_m - first_m) / _COLUMN_M).astype(np.int64)
+    # Depths are smaller than one, so that one key sorts by column and depth.
+    order = np.argsort(2 * column + behind_m)
+    sorted_column = column[order]
+    starts = np.flatnonzero(np.diff(sorted_column, prepend=-1))
+    sizes = np.diff(starts, append=len(order))
+    enough = sizes >= 3
+    starts, sizes = starts[enough], sizes[enough]
+    middles_m = (sorted_column[starts] + 0.5) * _COLUMN_M + first_m
+    return middles_m, behind_m[order[starts + sizes // 2]]
+
+
+def _best_columns(s: Floats, d: Floats) -> NDArray[np.bool_] | None:
+    """Return the columns near the line through two of them that most are near to; None if all such lines turn."""
+    first, second = _pairs(len(s))
+    slopes = (d[second] - d[first]) / (s[second] - s[first])
+    flat = np.flatnonzero(np.abs(slopes) <= math.tan(math.radians(_MAX_TURN_DEG)))
+    if len(flat) == 0:
+        return None
     first, slopes = first[flat], slopes[flat]
     starts_m = d[first] - slopes * s[first]
-    off = (d - slopes[:, None] * s - starts_m[:, None]) / _INLIER_M
-    gains = np.maximum(1 - off * off, 0)
-    best = gains[np.argmax(gains.sum(axis=1))] > 0
-    plan = line.centre + s[best, None] * line.direction + d[best, None] * line.normal
-    return _fit(plan, np.ones(len(plan)))
+    gains = np.multiply.outer(slopes, s)
+    np.subtract(d, gains, out=gains)
+    gains -= starts_m[:, None]
+    gains /= _INLIER_M
+    np.square(gains, out=gains)
+    np.subtract(1, gains, out=gains)
+    np.maximum(gains, 0, out=gains)
+    best: NDArray[np.bool_] = gains[np.argmax(gains.sum(axis=1))] > 0
+    return best
 
 
-def _fit(cells_m: Floats, heights_m: Floats) -> Line:
+@lru_cache(maxsize=64)
+def _pairs(count: int) -> tuple[Indices, Indices]:
+    """Return both columns of the pairs that are tried, of all pairs of so many columns."""
+    first, second = np.triu_indices(count, 1)
+    step = max(1, len(first) * count // _MAX_TRIALS)
+    return first[::step], second[::step]
+
+
+def _across_m(line: Line, plan: Floats) -> Floats:
+    """Return the distances (N,) of places (2, N) behind a line."""
+    across_m: Floats = line.normal @ (plan - line.centre[:, None])
+    return across_m
+
+
+def _fit(cells_m: Floats, heights_m: Floats | None = None) -> Line:
     """Return the line of least squares; its direction points to the left as the camera sees it."""
     line = fit_line(cells_m, heights_m)
     normal = line.normal

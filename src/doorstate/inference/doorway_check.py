@@ -3,20 +3,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from doorstate.clouds.floor import lowest_z_m
 from doorstate.doorways.doorway import Doorway
 from doorstate.doorways.evidence import DoorwayEvidence, find_evidence
 from doorstate.doorways.finder import thinned
 from doorstate.doorways.leaf_sweep import SEMI_OPEN_ANGLES_DEG, sweep_leaf
+from doorstate.doorways.measured_view import MeasuredView
 from doorstate.inference.abstention import Abstention
 from doorstate.inference.door import Door
-from doorstate.inference.seen_through import floor_rays
+from doorstate.inference.seen_through import FloorRays, floor_rays
 from doorstate.types import DoorState, Points
 
 _MAX_POINTS = 12_000  # of a cloud: eight for each cell of a door 2.5 m away
@@ -52,34 +53,56 @@ class DoorwayLimits(NamedTuple):
     free_reach_m: float
 
 
-class _Case(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class _Case:
     """A door, what its doorway shows, and the points to look at."""
 
-    points: NDArray[np.float32]
+    view: MeasuredView
     door: Door
     doorway: Doorway
     evidence: DoorwayEvidence
     limits: DoorwayLimits
 
+    @cached_property
+    def floor_rays(self) -> FloorRays | None:
+        """Rays to the floor behind the opening."""
+        points = self.view.points
+        measured = np.ones(len(points), dtype=bool)
+        return floor_rays(points, measured, self.door.opening, self.limits.free_reach_m)
 
-def check_doorway(cloud: Points, door: Door, limits: DoorwayLimits) -> DoorwayCheck:
-    """Return the reason against the state of a door, or None, and whether the leaf of an open one was seen.
+    @property
+    def passes(self) -> bool:
+        """True if the floor behind the opening was measured through it."""
+        rays = self.floor_rays
+        if rays is None:
+            return False
+        return rays.passed >= self.limits.min_floor_share and rays.seen >= _MIN_SEEN_FLOOR
+
+
+def check_doorways(cloud: Points, doors: Sequence[Door], limits: DoorwayLimits) -> list[DoorwayCheck]:
+    """Return for each door the reason against its state, or None, and whether the leaf of an open one was seen.
 
     Args:
         cloud: (N, 3) or organized (H, W, 3) metres, level sensor frame.
-        door: door with a state; without one there is nothing to check.
+        doors: doors; one without a state is not checked.
         limits: limits.
     """
+    if all(door.state is None for door in doors):
+        return [DoorwayCheck(None)] * len(doors)
     points = thinned(cloud)
-    points = points[:: max(1, round(len(points) / _MAX_POINTS))]
-    if door.state is None or len(points) == 0:
+    view = MeasuredView(points[:: max(1, round(len(points) / _MAX_POINTS))])
+    return [_check(view, door, limits) for door in doors]
+
+
+def _check(view: MeasuredView, door: Door, limits: DoorwayLimits) -> DoorwayCheck:
+    if door.state is None or len(view.points) == 0:
         return DoorwayCheck(None)
-    floor_z_m = lowest_z_m(points) if door.floor_z_m is None else door.floor_z_m
+    floor_z_m = view.lowest_z_m if door.floor_z_m is None else door.floor_z_m
     doorway = Doorway(door.x_m, door.y_m, door.yaw_deg, door.width_m, floor_z_m)
-    evidence = find_evidence(points, doorway)
+    evidence = find_evidence(view, doorway)
     if evidence.in_view < _MIN_IN_VIEW:
         return DoorwayCheck(Abstention("door_out_of_view"))
-    return _CHECKS[door.state](_Case(points, door, doorway, evidence, limits))
+    return _CHECKS[door.state](_Case(view, door, doorway, evidence, limits))
 
 
 def _check_closed(case: _Case) -> DoorwayCheck:
@@ -98,7 +121,7 @@ def _check_semi_open(case: _Case) -> DoorwayCheck:
     is_missing = evidence.missing > case.limits.max_missing_share
     if (is_askew or is_aside) and not is_missing:
         return DoorwayCheck(None)
-    if sweep_leaf(case.points, case.doorway, SEMI_OPEN_ANGLES_DEG) is not None:
+    if sweep_leaf(case.view, case.doorway, SEMI_OPEN_ANGLES_DEG) is not None:
         return DoorwayCheck(None)
     if is_missing:
         return DoorwayCheck(_reason(evidence))
@@ -108,23 +131,20 @@ def _check_semi_open(case: _Case) -> DoorwayCheck:
 def _check_open(case: _Case) -> DoorwayCheck:
     """Require an opening that is not filled, and a leaf or the floor behind it."""
     evidence = case.evidence
-    measured = np.ones(len(case.points), dtype=bool)
-    rays = floor_rays(case.points, measured, case.door.opening, case.limits.free_reach_m)
-    passes = rays is not None and rays.passed >= case.limits.min_floor_share and rays.seen >= _MIN_SEEN_FLOOR
-    if _is_filled(evidence) and not passes:
+    if _is_filled(evidence) and not case.passes:
         return DoorwayCheck(Abstention("opening_blocked", {"share": evidence.flush}))
     hidden = _hidden(evidence, _MAX_HIDDEN)
     is_measured = evidence.missing <= case.limits.max_missing_share
     # Furniture before a dark leaf may look like a part of a leaf; nothing passes it.
-    is_crossed = is_measured or passes or evidence.through >= _CROSSED
-    if sweep_leaf(case.points, case.doorway, min_share=_LEAF if is_crossed else _WHOLE_LEAF) is not None:
+    is_crossed = is_measured or evidence.through >= _CROSSED or case.passes
+    if sweep_leaf(case.view, case.doorway, min_share=_LEAF if is_crossed else _WHOLE_LEAF) is not None:
         return DoorwayCheck(None, leaf_seen=True)
     if hidden is not None:
         return DoorwayCheck(hidden)
     # Seen along the wall, sight lines end on what bounds the opening. Things behind without their floor are seen
     # through glass, but the floor may be out of view.
-    space = evidence.on_wall - evidence.flush + (evidence.through if rays is None else 0.0)
-    if passes or (is_measured and space >= _MIN_SPACE):
+    space = evidence.on_wall - evidence.flush + (evidence.through if case.floor_rays is None else 0.0)
+    if case.passes or (is_measured and space >= _MIN_SPACE):
         return DoorwayCheck(None, leaf_seen=False)
     if evidence.on_wall >= _BLOCKED:
         return DoorwayCheck(Abstention("opening_blocked", {"share": evidence.on_wall}))

@@ -19,7 +19,7 @@ from doorstate.clouds.shape import check_single_cloud
 from doorstate.clouds.units import check_units
 from doorstate.doorways.crop import CropSpec, crop_cloud
 from doorstate.doorways.doorway import Doorway
-from doorstate.doorways.finder import find_doorways, thinned
+from doorstate.doorways.finder import find_doorways
 from doorstate.errors import TooFewPointsError
 from doorstate.inference.abstention import Abstention
 from doorstate.inference.backends import CloudOutputs, run_by_size
@@ -159,10 +159,10 @@ class DoorwayPredictor(NetworkPredictor):
         """Return the doors with what the gate says of them."""
         if self.gate is None:
             return list(doors)
-        points = thinned(cloud)  # once for all doors
+        checks = self.gate.check_doorways(cloud, doors)
         return [
-            door if door.state is None else _with_check(door, self.gate.check_doorway(points, door))
-            for door in doors
+            door if door.state is None else _with_check(door, check)
+            for door, check in zip(doors, checks, strict=True)
         ]
 
 

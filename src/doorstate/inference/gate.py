@@ -16,7 +16,7 @@ from doorstate.clouds.preparation import MIN_POINTS
 from doorstate.errors import ConfigError
 from doorstate.inference.abstention import Abstention
 from doorstate.inference.door import Door
-from doorstate.inference.doorway_check import DoorwayCheck, DoorwayLimits, check_doorway
+from doorstate.inference.doorway_check import DoorwayCheck, DoorwayLimits, check_doorways
 from doorstate.inference.holes import find_holes
 from doorstate.inference.seen_through import Opening, seen_share
 from doorstate.types import Points
@@ -67,7 +67,7 @@ class Gate:
         margin_share: columns ignored on each side; chosen: stereo and registered cameras measure nothing in up to a
             tenth.
 
-        max_missing_share: of one doorway (`check_doorway`): largest share of its opening from which nothing came back;
+        max_missing_share: of one doorway (`check_doorways`): largest share of its opening from which nothing came back;
             chosen: a tenth of the image may be lost on a door that fills a quarter of it.
         min_floor_share: of one doorway: least share of the rays to the floor behind an opening without a visible leaf
             that came back; chosen: none come back from dark leaves, and half may be lost.
@@ -126,7 +126,7 @@ class Gate:
     def check_view(self, cloud: Points, outlier_share: float = 0.0) -> Abstention | None:
         """Return the reason why no doorway can be searched for in a cloud, or None if one can; arguments as for a call.
 
-        Doorways are checked one by one (`check_doorway`), so that a hole beside them is no reason.
+        Doorways are checked one by one (`check_doorways`), so that a hole beside them is no reason.
         """
         checks = (
             self._enough_points,
@@ -135,15 +135,15 @@ class Gate:
         )
         return self._first_reason(cloud, outlier_share, checks)
 
-    def check_doorway(self, cloud: Points, door: Door) -> DoorwayCheck:
-        """Return what a level cloud shows of a door that a network has given a state: a reason against it, or none.
+    def check_doorways(self, cloud: Points, doors: Sequence[Door]) -> list[DoorwayCheck]:
+        """Return what a level cloud shows of doors that a network has given states: a reason against each, or none.
 
         Args:
             cloud: as for a call, level.
-            door: door in the frame of the cloud.
+            doors: doors in the frame of the cloud.
         """
         limits = DoorwayLimits(self.max_missing_share, self.min_floor_share, self.free_reach_m)
-        return check_doorway(np.asarray(cloud), door, limits)
+        return check_doorways(np.asarray(cloud), doors, limits)
 
     def check_opening(self, cloud: Points, opening: Opening) -> Abstention | None:
         """Return the reason why an opening that a network or rule calls open is none, or None if it may be one.
