@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 import torch
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
 from doorstate.cli import main
 from doorstate.clouds.preparation import CloudSpec
@@ -31,10 +31,11 @@ from doorstate.simulation.writer import simulate_dataset
 SMALL_POINTS = 160
 Run = Callable[..., tuple[int, str, str]]
 
+# No test depends on how busy the machine is.
+settings.register_profile("suite", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 # A landing must not depend on luck; everybody else's runs go on looking for new counterexamples.
-settings.register_profile("ci", derandomize=True)
-if os.environ.get("CI"):
-    settings.load_profile("ci")
+settings.register_profile("ci", settings.get_profile("suite"), derandomize=True)
+settings.load_profile("ci" if os.environ.get("CI") else "suite")
 
 
 @pytest.fixture(autouse=True, scope="session")

@@ -125,6 +125,12 @@ def test_text_is_utf_8_in_every_locale(tmp_path: Path) -> None:
     assert (tmp_path / "a.txt").read_bytes() == "yarı açık kapı".encode()
 
 
+def test_broken_characters_of_file_names_are_escaped(tmp_path: Path) -> None:
+    for name in ("a.csv", "a.csv.gz"):
+        write_csv(tmp_path / name, [{"file": "a\udcff"}])
+        assert read_csv(tmp_path / name) == [{"file": r"a\udcff"}]
+
+
 def test_folders_with_only_temporary_files_are_vacant(tmp_path: Path) -> None:
     assert is_vacant(tmp_path / "new")
     for name in (

@@ -24,6 +24,7 @@ from doorstate._input import MAX_TABLE_BYTES, open_input
 from doorstate.errors import DatasetError, OutputError
 
 LOCK_PREFIX = ".doorstate"  # of the files that `_locks` keeps in a folder
+_BROKEN = "backslashreplace"  # for names of files that are not in UTF-8
 _SCRATCH = re.compile(rf"\.[0-9a-f]+\.tmp\..+|{re.escape(LOCK_PREFIX)}.*\.(lock|owner)")
 
 
@@ -108,13 +109,13 @@ def is_vacant(folder: Path) -> bool:
 def write_text(target: Path, text: str, durable: bool = True) -> None:
     """Write `text` as UTF-8, atomically; `durable` as in `atomic_path`."""
     with atomic_path(target, durable) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+        temporary.write_text(text, encoding="utf-8", errors=_BROKEN)
 
 
 def write_compressed_text(target: Path, text: str) -> None:
     """Write `text` as UTF-8, compressed with gzip; the same text gives the same bytes."""
     with atomic_path(target) as temporary:
-        temporary.write_bytes(gzip.compress(text.encode("utf-8"), mtime=0))
+        temporary.write_bytes(gzip.compress(text.encode("utf-8", _BROKEN), mtime=0))
 
 
 def write_csv(path: Path, rows: Sequence[Mapping[str, str]]) -> None:
@@ -143,7 +144,7 @@ def read_csv(path: Path) -> list[dict[str, str]]:
         DatasetError: the file is missing, too large or no text, or a line has more or fewer columns than the header.
     """
     try:
-        rows = list(csv.DictReader(io.StringIO(_read_text(path), newline=""), strict=True))
+        rows = list(csv.DictReader(io.StringIO(read_table_text(path), newline=""), strict=True))
     except (OSError, EOFError, zlib.error, UnicodeDecodeError, csv.Error) as error:
         raise DatasetError(f"cannot be read as CSV ({error})", path=path) from error
     for number, row in enumerate(rows, start=2):
@@ -152,8 +153,13 @@ def read_csv(path: Path) -> list[dict[str, str]]:
     return rows
 
 
-def _read_text(path: Path) -> str:
-    """Read a text file of a limited size, which also limits what a compressed one unpacks to."""
+def read_table_text(path: Path) -> str:
+    """Read a table's text in UTF-8, unpacked if its name ends in `.gz`.
+
+    Raises:
+        DatasetError: the file is missing, no regular file, or too large, packed or unpacked.
+        OSError, EOFError, zlib.error, UnicodeDecodeError: it is damaged.
+    """
     with open_input(path, MAX_TABLE_BYTES, DatasetError) as stream:
         unpacked = gzip.GzipFile(fileobj=stream) if path.suffix == ".gz" else stream
         content = unpacked.read(MAX_TABLE_BYTES + 1)

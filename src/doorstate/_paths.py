@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Names of files in tables, which stay inside the folder of their table."""
+"""Names of files: those in tables stay inside the folder of their table, and none is obeyed by what shows it."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from doorstate.errors import DatasetError
+from doorstate.errors import CloudReadError, DatasetError
 
 
 def resolve_inside(folder: Path, name: str) -> Path:
@@ -28,3 +28,31 @@ def resolve_inside(folder: Path, name: str) -> Path:
             f"{name!r} is outside of the folder", path=folder, expected="a relative path to a file inside"
         )
     return path
+
+
+def check_encoding(name: str) -> None:
+    """Check that a table can hold the name of a file.
+
+    Raises:
+        CloudReadError: it is not in UTF-8; Python gives such bytes as single surrogates.
+    """
+    if not name.isascii() and any("\ud800" <= character <= "\udfff" for character in name):
+        raise CloudReadError("its name is not in UTF-8", hint="rename it")
+
+
+def csv_name(name: str) -> str:
+    """Return a file name for a table that neither a spreadsheet nor a terminal obeys.
+
+    One that begins as a formula begins with `./`, and still names the same file; JSON has the exact names of all.
+    """
+    return printable(f"./{name}" if name[:1] in ("=", "+", "-", "@", "\t", "\r") else name)
+
+
+def printable(text: str) -> str:
+    """Return text with control characters, terminal escapes and broken characters written as escape sequences."""
+    return "".join(
+        character
+        if character.isprintable() or character == "\n"
+        else character.encode("unicode_escape").decode("ascii")
+        for character in text
+    )

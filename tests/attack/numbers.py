@@ -5,8 +5,9 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,14 @@ from onnx import TensorProto, helper, numpy_helper
 from safetensors.torch import save_file
 
 from doorstate.clouds.preparation import MIN_POINTS
-from doorstate.inference.backends.onnx_backend import INPUT, PROBABILITIES
+from doorstate.inference.abstention import AbstentionCode
+from doorstate.inference.backends.onnx_backend import (
+    INPUT,
+    PROBABILITIES,
+    RAW_PROBABILITIES,
+    REASON,
+    REASONS,
+)
 from doorstate.inference.export.description import describe
 from doorstate.inference.network_predictor import NetworkPredictor
 from doorstate.inference.prediction import Prediction
@@ -26,7 +34,7 @@ from doorstate.networks import create_network
 from doorstate.networks.card import CARD_KEY, WeightsCard
 from doorstate.networks.digest import add_digest
 from doorstate.networks.weights import save_weights
-from doorstate.types import STATES, DoorState
+from doorstate.types import DOOR, STATES, DoorState
 from tests.attack.tries import Try, Violation, attempt
 
 CARD = WeightsCard(network="pointnet", num_points=MIN_POINTS)
@@ -71,9 +79,12 @@ def attack_graphs(folder: Path, rounds: int) -> Iterator[Try]:
     """Export graphs whose outputs are no probabilities, and flip their bits."""
     path = folder / "w.onnx"
     for row in ROWS:
-        _write_graph(path, row)
+        write_graph(path, row)
         yield attempt("an exported network gives no probabilities", lambda: _answer(path), Violation.NUMBERS)
-    _write_graph(path, [0.2, 0.3, 0.5])
+    for number, reason in product((*BROKEN, 7.0), REASONS):
+        write_graph(path, [0.1, 0.1, 0.8], number, reason)
+        yield attempt("an exported network gives a broken head", lambda: _answer(path), Violation.NUMBERS)
+    write_graph(path, [0.2, 0.3, 0.5])
     yield from _flip_bytes("a flipped bit of an exported network", path, rounds)
 
 
@@ -109,22 +120,36 @@ def _answer(path: Path) -> str:
     return "no state, with the reason"
 
 
-def _write_graph(path: Path, row: list[float]) -> None:
+def write_graph(
+    path: Path, row: Sequence[float], door: float | None = None, reason: AbstentionCode | None = None
+) -> None:
+    """Write an exported network that gives the same outputs for every cloud.
+
+    Args:
+        path: file to write.
+        row: probabilities of the states.
+        door: output of the head `door`; None: the file is one of version 0.1, without heads and reasons.
+        reason: output `reason`.
+    """
     shape: list[Any] = ["batch", MIN_POINTS, 3]
     points = helper.make_tensor_value_info(INPUT, TensorProto.FLOAT, shape)
-    output = helper.make_tensor_value_info(PROBABILITIES, TensorProto.FLOAT, ["batch", 3])
-    constants = [
-        numpy_helper.from_array(np.array(value), name)
-        for name, value in (("axes", np.int64([1])), ("zero", np.float32(0)), ("row", np.float32(row)))
-    ]
-    nodes = [
-        helper.make_node("ReduceMean", [INPUT, "axes"], ["mean"], keepdims=0),
-        helper.make_node("Mul", ["mean", "zero"], ["zeros"]),
-        helper.make_node("Add", ["zeros", "row"], [PROBABILITIES]),
-    ]
-    graph = helper.make_graph(nodes, "g", [points], [output], constants)
+    values = {PROBABILITIES if door is None else RAW_PROBABILITIES: np.float32(row)}
+    if door is not None:
+        values |= {DOOR: np.float32([door]), REASON: np.int64(REASONS.index(reason))}
+    constants = [numpy_helper.from_array(np.array(value), f"{name}.value") for name, value in values.items()]
+    constants.append(numpy_helper.from_array(np.int64([1, 2]), "axes"))
+    nodes = [helper.make_node("ReduceMean", [INPUT, "axes"], ["mean"], keepdims=0)]  # (batch,)
+    nodes.append(helper.make_node("Shape", ["mean"], ["batch"]))
+    outputs = []
+    for name, value in values.items():
+        kind = helper.np_dtype_to_tensor_dtype(value.dtype)
+        outputs.append(helper.make_tensor_value_info(name, kind, ["batch", *value.shape]))
+        constants.append(numpy_helper.from_array(np.array(value.shape, np.int64), f"{name}.width"))
+        nodes.append(helper.make_node("Concat", ["batch", f"{name}.width"], [f"{name}.shape"], axis=0))
+        nodes.append(helper.make_node("Expand", [f"{name}.value", f"{name}.shape"], [name]))
+    graph = helper.make_graph(nodes, "g", [points], outputs, constants)
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 18)], ir_version=8)
-    describe(model, CARD)
+    describe(model, CARD if door is None else CARD.model_copy(update={"heads": (DOOR,)}))
     path.write_bytes(add_digest(model.SerializeToString()))
 
 

@@ -39,13 +39,3 @@ def test_json_lines_are_printable_and_keep_the_text(text: str) -> None:
     line = console.json_line({"file": text})
     assert json.loads(line) == {"file": text}
     assert not any(0x7F <= ord(c) <= 0x9F or ord(c) < 0x20 or 0xD800 <= ord(c) <= 0xDFFF for c in line)
-
-
-@pytest.mark.parametrize("name", ["=SUM(A1).npy", "+1.npy", "-x.npy", "@a.npy"])
-def test_file_names_are_no_formulas(name: str) -> None:
-    assert console.csv_name(name) == f"./{name}"
-    assert console.csv_name("a/" + name) == "a/" + name
-
-
-def test_file_names_in_csv_are_not_obeyed_by_terminals() -> None:
-    assert console.csv_name("\x1b[31ma.npy") == r"\x1b[31ma.npy"

@@ -59,7 +59,7 @@ def test_stalled_upload_does_not_hold_the_end_of_an_open_service() -> None:
     process = subprocess.Popen(
         [
             COMMAND,
-            *("serve", "--host", "0.0.0.0", "--port", "0", "--rule", "plane_state", "--workers", "1"),
+            *("serve", "--host", "0", "--port", "0", "--rule", "plane_state", "--workers", "1"),
             *("--timeout-s", "2", "--verbose"),
         ],
         stdout=subprocess.PIPE,
@@ -81,6 +81,10 @@ def test_stalled_upload_does_not_hold_the_end_of_an_open_service() -> None:
     assert "--token" in warning
     assert lines
     assert all(re.match(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3} [A-Z]+ ", line) for line in lines)
+
+
+def test_empty_token_is_one_line(run: Run, weights: Path) -> None:
+    check_error(run("serve", "--port", 0, "--weights", weights, "--token", ""), 2, "--token")
 
 
 def test_used_port_is_one_line(run: Run, weights: Path) -> None:

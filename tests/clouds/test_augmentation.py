@@ -46,7 +46,7 @@ def test_defaults_change_nothing() -> None:
 
 
 @given(seed=seeds)
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 def test_yaw_keeps_heights_distances_and_handedness(seed: int) -> None:
     changed = augmented(Augmentation(yaw_deg=180), seed)
     np.testing.assert_array_equal(changed[..., 2], POINTS[..., 2])
@@ -80,7 +80,7 @@ def test_a_tilt_is_small_and_a_rotation() -> None:
 
 
 @given(seed=seeds)
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 def test_scale_keeps_angles_and_so_the_doors(seed: int) -> None:
     changed = augmented(Augmentation(scale=(0.5, 2.0)), seed)
     np.testing.assert_allclose(angles(changed), angles(POINTS), atol=2e-3)
@@ -114,7 +114,7 @@ def test_jitter_is_clipped_and_a_shift_moves_whole_clouds() -> None:
 
 
 @given(seed=seeds)
-@settings(deadline=None, max_examples=10)
+@settings(max_examples=10)
 def test_a_seed_draws_the_same_again(seed: int) -> None:
     everything = Augmentation(
         yaw_deg=90, mirror=0.5, scale=(0.8, 1.2), scale_z=(0.9, 1.1), shift=0.1, tilt_deg=3, jitter=0.01

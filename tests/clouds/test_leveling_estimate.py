@@ -28,7 +28,7 @@ def error_deg(leveling: Leveling, pitch_deg: float, roll_deg: float) -> float:
     return math.degrees(math.acos(min(1.0, float(leveling.rotation[2] @ true_up))))
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(st.floats(-5, 22), st.floats(-35, 35), st.floats(0.4, 1.2), st.sampled_from([(120, 160), (-1,)]))
 def test_tilt_of_a_room_is_found(pitch: float, roll: float, height_m: float, shape: tuple[int, ...]) -> None:
     cloud = measure(ROOM, height_m=height_m, pitch_deg=pitch, roll_deg=roll).reshape(*shape, 3)

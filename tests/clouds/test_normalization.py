@@ -11,7 +11,7 @@ from doorstate.clouds.normalization import normalize
 
 
 @given(seed=st.integers(0, 2**32 - 1), offset=st.floats(-20, 20))
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 def test_clouds_are_centred_and_in_units_of_three_metres(seed: int, offset: float) -> None:
     points = np.random.default_rng(seed).uniform(0.5, 4.0, (200, 3)).astype(np.float32) + np.float32(offset)
     normalized = normalize(np.stack([points, points * 2]))

@@ -164,7 +164,7 @@ SPECIAL = np.array([0, np.nan, np.inf, -np.inf, 3.4e38, -3.4e38, 1e-30, 1e7, 1],
 
 
 @given(seed=st.integers(0, 2**32 - 1), share=st.floats(0, 1), spread=st.floats(1e-6, 30))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_any_values_are_taken(seed: int, share: float, spread: float) -> None:
     rng = np.random.default_rng(seed)
     points = np.exp(rng.normal(0, spread, (600, 3))).clip(0, 1e38).astype(np.float32)

@@ -32,7 +32,7 @@ NOT_MEASURED = (
 
 
 @given(seed=st.integers(0, 2**32 - 1), holes=st.lists(st.sampled_from(NOT_MEASURED), max_size=900))
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 def test_unmeasured_points_are_dropped_and_indices_are_raw_rows(
     seed: int, holes: list[tuple[float, float, float]]
 ) -> None:

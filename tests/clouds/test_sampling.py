@@ -144,7 +144,7 @@ def clouds(draw: st.DrawFn) -> Points:
 
 
 @given(points=clouds())
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 def test_all_implementations_give_the_same_indices(compiled: Sampler, points: Points) -> None:
     count = min(len(points), 150)
     expected = farthest_point_indices(points, count, NUMPY)
@@ -177,7 +177,7 @@ def test_all_implementations_give_the_same_indices_of_a_whole_frame(compiled: Sa
 
 
 @given(points=clouds())
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 def test_each_point_is_the_farthest_that_is_left(points: Points) -> None:
     order = farthest_point_indices(points, min(len(points), 100))
     own, largest = distances_to_earlier(points, order)
@@ -201,7 +201,7 @@ def test_the_first_points_of_a_sampled_cloud_are_its_sample(length: int, prefix:
 
 
 @given(seed=st.integers(0, 2**32 - 1))
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 def test_the_order_of_the_file_does_not_matter(sampler: Sampler, seed: int) -> None:
     points = random_cloud(seed, 3000)
     shuffle = np.random.default_rng(seed).permutation(len(points))
@@ -210,7 +210,7 @@ def test_the_order_of_the_file_does_not_matter(sampler: Sampler, seed: int) -> N
 
 
 @given(seed=st.integers(0, 2**32 - 1), scale=st.floats(0.2, 5.0), mirror=st.booleans())
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 def test_the_order_survives_turning_mirroring_and_scaling(seed: int, scale: float, mirror: bool) -> None:
     points = random_cloud(seed, 500)
     points = points[farthest_point_indices(points, 200)].astype(np.float64)

@@ -29,7 +29,7 @@ def test_pixels_of_every_second_row_and_column() -> None:
 
 
 @given(seed=st.integers(0, 2**32 - 1), fewest=st.sampled_from([100, 800, 3200]), flat=st.booleans())
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 def test_enough_points_stay_and_each_dropped_one_has_a_neighbour(seed: int, fewest: int, flat: bool) -> None:
     points = (
         wall(seed, 20_000)
@@ -46,7 +46,7 @@ def test_enough_points_stay_and_each_dropped_one_has_a_neighbour(seed: int, fewe
 
 
 @given(seed=st.integers(0, 2**32 - 1))
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 def test_the_order_of_points_does_not_matter(seed: int) -> None:
     points = wall(seed, 5000)
     shuffle = np.random.default_rng(seed).permutation(len(points))

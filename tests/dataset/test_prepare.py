@@ -305,6 +305,17 @@ def test_class_folders_are_prepared_and_rejected_files_listed_with_reasons(
     assert again.rejected == rejected
 
 
+def test_odd_names_are_rejected_or_no_formulas(class_folders: Path, tmp_path: Path) -> None:
+    cloud = (class_folders / "Open" / "a.pcd").read_bytes()
+    (class_folders / "Open" / "\udcff.pcd").write_bytes(cloud)
+    (class_folders / "=open").mkdir()
+    (class_folders / "=open" / "a.pcd").write_bytes(b"")
+    folder = tmp_path / "doors"
+    rejected = prepare_dataset(Preparation(class_folders, SPEC), folder, workers=1).rejected
+    assert {"Open/\udcff.pcd", "=open/a.pcd"} < {row["file"] for row in rejected}
+    assert {r"Open/\udcff.pcd", "./=open/a.pcd"} < {row["file"] for row in read_csv(folder / REJECTED)}
+
+
 def test_poses_add_strata_and_read_options_apply(class_folders: Path, tmp_path: Path) -> None:
     poses = tmp_path / "poses.csv"
     poses.write_text("file,x_m,y_m,room\nOpen/a.pcd,0.0,2.2,hall\n", encoding="utf-8")

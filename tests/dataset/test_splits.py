@@ -71,7 +71,7 @@ def test_the_folds_of_the_paper_are_70_10_20_in_total_and_in_every_stratum() -> 
 
 
 @given(seed=st.integers(0, 2**32 - 1), sizes=st.lists(st.integers(1, 30), min_size=4, max_size=12))
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 def test_any_strata_are_spread_evenly(seed: int, sizes: list[int]) -> None:
     rows = [
         {"sample_id": f"{number}-{k}", "state": STATES[number % 3], "region": str(number)}

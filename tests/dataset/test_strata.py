@@ -56,7 +56,7 @@ def test_edges_of_the_regions_belong_to_the_side_of_the_wall_normal(angle_deg: f
 
 
 @given(st.floats(0, 180) | st.sampled_from([0.0, 30.0, 60.0, 90.0, 120.0, 150.0, 180.0]))
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=100)
 def test_regions_are_symmetric(angle_deg: float) -> None:
     mirrored = 180 - angle_deg
     if 180 - mirrored == angle_deg:  # exact in floating point
@@ -64,7 +64,7 @@ def test_regions_are_symmetric(angle_deg: float) -> None:
 
 
 @given(x_m=st.floats(-10, 10), y_m=st.floats(0.01, 10))
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=100)
 def test_polar_coordinates_invert(x_m: float, y_m: float) -> None:
     distance_m, angle_deg = polar(x_m, y_m)
     assert distance_m * math.cos(math.radians(angle_deg)) == pytest.approx(x_m, abs=1e-7)

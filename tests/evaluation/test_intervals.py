@@ -44,14 +44,14 @@ def test_intervals_without_samples_are_undefined() -> None:
     assert np.isnan(bootstrap_f1(draw(0, 0, 0), [], np.random.default_rng(0)).macro).all()
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(st.lists(st.booleans(), min_size=1, max_size=40))
 def test_independent_samples_have_wilsons_interval(correct: list[bool]) -> None:
     interval = grouped_interval(np.array(correct), [str(number) for number in range(len(correct))])
     assert interval == pytest.approx(wilson_interval(sum(correct), len(correct)), abs=1e-9)
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(st.lists(st.booleans(), min_size=1, max_size=12), st.integers(2, 5))
 def test_repeated_samples_add_nothing(correct: list[bool], copies: int) -> None:
     groups = [str(number) for number in range(len(correct)) for _ in range(copies)]
@@ -66,7 +66,7 @@ def test_one_large_group_counts_for_little_more_than_one_sample() -> None:
     assert high > 0.95
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(st.integers(0, 2**32 - 1))
 def test_intervals_of_groups_contain_the_share(seed: int) -> None:
     rng = np.random.default_rng(seed)

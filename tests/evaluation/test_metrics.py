@@ -51,7 +51,7 @@ def test_no_samples_give_an_empty_confusion_and_undefined_scores() -> None:
     assert math.isnan(accuracy(counts))
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(labels)
 def test_confusion_sums(pairs: list[tuple[str, str]]) -> None:
     counts = confusion(frame_of(pairs))
@@ -62,7 +62,7 @@ def test_confusion_sums(pairs: list[tuple[str, str]]) -> None:
     assert accuracy(counts) == pytest.approx(np.mean([one == two for one, two in pairs]))
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(labels)
 def test_scores_equal_scikit_learn(pairs: list[tuple[str, str]]) -> None:
     score = precision_recall_f1(confusion(frame_of(pairs)))

@@ -6,6 +6,7 @@ from __future__ import annotations
 import gzip
 import json
 import math
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -223,6 +224,25 @@ def test_damaged_published_form(
     save_results(load_results(make_comparison(imported)), folder)
     (folder / name).write_bytes((folder / name).read_bytes()[:40])
     with pytest.raises(DoorstateError, match=name):
+        load_results(folder)
+
+
+def test_a_pipe_or_a_huge_table_as_published_predictions_is_refused(
+    imported: PreparedDataset,
+    make_comparison: MakeComparison,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    folder = tmp_path / "published"
+    save_results(load_results(make_comparison(imported)), folder)
+    path = folder / "predictions.csv.gz"
+    monkeypatch.setattr("doorstate._files.MAX_TABLE_BYTES", 10 * path.stat().st_size)
+    path.write_bytes(gzip.compress(b"method,fold\n" + b" " * 50 * path.stat().st_size))
+    with pytest.raises(RunError, match=path.name):
+        load_results(folder)
+    path.unlink()
+    os.mkfifo(path)
+    with pytest.raises(RunError, match=path.name):
         load_results(folder)
 
 

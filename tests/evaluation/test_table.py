@@ -112,7 +112,7 @@ def test_latex_is_a_longtable_with_escaped_cells() -> None:
     assert lines[-1] == r"\end{longtable}"
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(st.lists(st.tuples(cells, cells), min_size=1, max_size=4))
 def test_csv_of_any_cells_reads_back(rows: list[tuple[str, str]]) -> None:
     read = list(csv.reader(io.StringIO(Table("", ("a", "b"), tuple(rows)).to_csv())))[1:]

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 import shutil
 import subprocess
@@ -16,10 +17,13 @@ import onnx
 import pytest
 from onnx import TensorProto, helper
 
+from doorstate.clouds.preparation import MIN_POINTS
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import ConfigError, WeightsError
-from doorstate.inference.backends.onnx_backend import OnnxBackend
+from doorstate.inference.abstention import AbstentionCode
+from doorstate.inference.backends.onnx_backend import REASONS, OnnxBackend
 from doorstate.inference.backends.threads import default_threads
+from doorstate.inference.decode import decode
 from doorstate.inference.network_predictor import NetworkPredictor
 from doorstate.inference.predictor import Predictor
 from doorstate.networks import create_network
@@ -27,7 +31,8 @@ from doorstate.networks.card import WeightsCard
 from doorstate.networks.weights import save_weights
 from doorstate.simulation.frames import replay
 from doorstate.simulation.manifest import unflatten
-from doorstate.types import Points
+from doorstate.types import DoorState, Points
+from tests.attack.numbers import write_graph
 
 Run = Callable[..., tuple[int, str, str]]
 DOCS = Path(__file__).resolve().parents[2] / "docs" / "onnx.md"
@@ -139,6 +144,18 @@ def test_unusable_files_are_weights_errors(tmp_path: Path, exported: Path) -> No
     graph = helper.make_graph([helper.make_node("Identity", ["x"], ["y"])], "foreign", [value], [same])
     onnx.save(helper.make_model(graph, ir_version=10, opset_imports=[helper.make_opsetid("", 18)]), path)
     assert error_of(path).field == "doorstate"
+
+
+@pytest.mark.parametrize("reason", REASONS)
+def test_a_broken_head_is_no_withheld_one(tmp_path: Path, reason: AbstentionCode | None) -> None:
+    path = tmp_path / "door.onnx"
+    write_graph(path, (0.1, 0.1, 0.8), math.nan, reason)
+    (outputs,) = OnnxBackend(path)(np.ones((1, MIN_POINTS, 3), np.float32)).per_cloud()
+    assert not outputs.are_valid()
+    write_graph(path, (0.1, 0.1, 0.8), 0.9, None)
+    (outputs,) = OnnxBackend(path)(np.ones((1, MIN_POINTS, 3), np.float32)).per_cloud()
+    assert outputs.are_valid()
+    assert decode(outputs, 0.0, MIN_POINTS, 0.0).state == DoorState.OPEN
 
 
 def test_export_rejects_options_that_do_not_fit(run: Run, weights: Path) -> None:

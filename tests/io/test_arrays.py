@@ -36,7 +36,7 @@ _numbers = st.sampled_from(["<f2", "<f4", ">f4", "<f8", "<u2", ">u2", "<i4", "<u
 
 
 @given(npst.arrays(_numbers, npst.array_shapes(min_dims=1, max_dims=3, min_side=0)), st.booleans())
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 def test_round_trip(array: NDArray[Any], fortran: bool) -> None:
     stored = np.asfortranarray(array) if fortran else array
     for data in (_npy(stored), _npy(stored, (2, 0)), _npy(stored, (3, 0))):
@@ -80,7 +80,7 @@ def test_other_kinds_of_values_are_refused(array: NDArray[Any]) -> None:
 
 
 @given(npst.arrays(np.float32, npst.array_shapes(max_dims=2).map(lambda shape: (*shape, 3))), st.booleans())
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 def test_structured_arrays_have_fields_x_y_z(points: NDArray[np.float32], is_big_endian: bool) -> None:
     kind = ">f4" if is_big_endian else "<f4"
     stored = np.zeros(points.shape[:-1], [("intensity", "u1"), ("z", kind), ("x", kind), ("y", "<f8")])

@@ -99,7 +99,7 @@ def test_from_hfov_is_the_gazebo_formula() -> None:
 
 
 @given(st.integers(1, 2896), st.integers(1, 2896), st.floats(0.1, 3.0))
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 def test_from_hfov_spans_the_field_of_view(width: int, height: int, hfov_rad: float) -> None:
     camera = Intrinsics.from_hfov(width, height, hfov_rad)
     # From the outer edge of the first pixel to the outer edge of the last one.

@@ -58,7 +58,7 @@ def test_missing_depth_is_nan_and_the_input_is_unchanged() -> None:
 
 
 @given(_frames())
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=100)
 def test_equals_the_inverse_camera_matrix_in_the_optical_frame(
     frame: tuple[NDArray[np.float32], Intrinsics],
 ) -> None:
@@ -75,7 +75,7 @@ def test_equals_the_inverse_camera_matrix_in_the_optical_frame(
 
 
 @given(_frames())
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 def test_is_the_plain_loop_in_float64_bit_for_bit(frame: tuple[NDArray[np.float32], Intrinsics]) -> None:
     depth_m, k = frame
     points = depth_to_points(depth_m, k)
@@ -110,7 +110,7 @@ def test_a_camera_turned_clockwise_by_90_degrees_sees_up_at_the_left() -> None:
 
 
 @given(_frames(), st.sampled_from(ROLLS))
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=100)
 def test_a_turned_camera_measures_the_same_points(
     frame: tuple[NDArray[np.float32], Intrinsics], roll_deg: int
 ) -> None:

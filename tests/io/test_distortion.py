@@ -51,7 +51,7 @@ def plain(model: str, k: tuple[float, ...], x: float, y: float) -> tuple[float, 
 
 
 @given(MODELS)
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 def test_rays_come_back_through_the_lens(lens: Distortion) -> None:
     distorted = np.array(
         [[plain(lens.model, lens.coefficients, *ray) for ray in row] for row in GRID.tolist()]

@@ -61,7 +61,7 @@ def test_tables_about_clouds_and_prepared_data_sets_are_not_clouds(tmp_path: Pat
 
 
 @given(st.lists(st.integers(0, 10**6), min_size=1, max_size=6, unique=True), st.randoms())
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 def test_numbers_in_names_are_sorted_by_value(
     tmp_path_factory: pytest.TempPathFactory, numbers: list[int], random: Any
 ) -> None:

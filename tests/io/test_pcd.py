@@ -50,7 +50,7 @@ def test_reads_what_pypcd4_writes(tmp_path: Path, encoding: Encoding) -> None:
 
 
 @given(points=_clouds)
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 def test_every_float32_survives_writing_and_reading(
     tmp_path_factory: pytest.TempPathFactory, points: NDArray[np.float32]
 ) -> None:
@@ -60,7 +60,7 @@ def test_every_float32_survives_writing_and_reading(
 
 
 @given(points=_clouds)
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 def test_nine_digits_of_text_are_the_same_float32(points: NDArray[np.float32]) -> None:
     rows = "".join(" ".join(f"{value:.9g}" for value in row) + "\n" for row in points.tolist())
     data = HEADER.replace("POINTS 3", f"POINTS {len(points)}") + rows

@@ -46,7 +46,7 @@ def test_reads_what_trimesh_writes(encoding: str) -> None:
 
 
 @given(npst.arrays(np.float32, st.tuples(st.integers(0, 12), st.just(3)), elements=st.floats(width=32)))
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 def test_every_float32_survives_every_encoding(points: NDArray[np.float32]) -> None:
     elements = VERTICES.replace("3", str(len(points)))
     rows = "".join(" ".join(f"{value:.9g}" for value in row) + "\n" for row in points.tolist())
@@ -77,7 +77,7 @@ _lists = st.lists(st.integers(-(2**15), 2**15 - 1), max_size=3)
 
 
 @given(st.data(), st.sampled_from(["ascii", "binary_little_endian", "binary_big_endian"]))
-@settings(deadline=None, max_examples=150)
+@settings(max_examples=150)
 def test_lists_before_between_and_after_are_skipped(data: st.DataObject, encoding: str) -> None:
     points = data.draw(npst.arrays(np.float32, st.tuples(st.integers(1, 6), st.just(3)), elements=_FLOATS))
     lengths = data.draw(st.sampled_from(["uchar", "ushort", "int", "uint8"]))

@@ -26,7 +26,7 @@ def _png(image: Image.Image) -> bytes:
 
 
 @given(npst.arrays(np.uint16, npst.array_shapes(min_dims=2, max_dims=2, max_side=20)))
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 def test_round_trip(depth: NDArray[np.uint16]) -> None:
     pixels = parse_depth_png(_png(Image.fromarray(depth)))
     assert pixels.dtype == np.uint16
@@ -66,7 +66,7 @@ def test_other_bytes_are_no_png(data: bytes) -> None:
 
 
 @given(npst.arrays(np.uint8, npst.array_shapes(min_dims=2, max_dims=2, max_side=20)), st.booleans())
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 def test_eight_bits_are_read_as_coarse_depth(depth: NDArray[np.uint8], as_colour: bool) -> None:
     image = Image.fromarray(depth)
     pixels = parse_coarse_png(_png(image.convert("RGB") if as_colour else image))
@@ -89,7 +89,7 @@ def test_other_images_are_no_coarse_depth(image: Image.Image, message: str) -> N
 
 
 @given(st.integers(0, 400), st.binary(max_size=30))
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 def test_damaged_coarse_images_are_read_or_refused(keep: int, rest: bytes) -> None:
     whole = _png(Image.fromarray(np.arange(400, dtype=np.uint8).reshape(20, 20)))
     with suppress(CloudReadError):

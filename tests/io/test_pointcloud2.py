@@ -76,7 +76,7 @@ def messages(draw: st.DrawFn) -> tuple[dict[str, Any], NDArray[np.float64]]:
 
 
 @given(drawn=messages())
-@settings(deadline=None, max_examples=200)
+@settings(max_examples=200)
 def test_every_layout_gives_its_points(drawn: tuple[dict[str, Any], NDArray[np.float64]]) -> None:
     message, values = drawn
     points = points_from_pointcloud2(**message)

@@ -23,7 +23,7 @@ from doorstate.io.png import parse_depth_png
 from doorstate.io.text import parse_table
 from tests.fuzz.examples import saved
 
-_SETTINGS = settings(deadline=None, max_examples=60, suppress_health_check=list(HealthCheck))
+_SETTINGS = settings(max_examples=60, suppress_health_check=list(HealthCheck))
 _NUMBERS = (np.float32, np.float64, np.int16, np.uint8, np.uint32)
 _points = npst.arrays(np.float32, st.tuples(st.integers(1, 9), st.just(3)), elements=st.floats(width=32))
 

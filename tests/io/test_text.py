@@ -78,7 +78,7 @@ def test_variants(text: str) -> None:
     st.sampled_from([" ", ",", ";", "\t"]),
     st.sampled_from(["", "x,y,z,a,b,c"]),
 )
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=100)
 def test_reads_what_numpy_writes(values: NDArray[np.float32], delimiter: str, header: str) -> None:
     stream = io.BytesIO()
     names = ",".join(header.split(",")[: values.shape[1]])

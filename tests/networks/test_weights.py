@@ -99,13 +99,16 @@ def test_one_number_that_is_not_finite_is_refused(number: float, tmp_path: Path)
         assert (caught.value.path, caught.value.field) == (path, name)
 
 
-def test_weights_of_another_type_are_refused(tmp_path: Path) -> None:
+@pytest.mark.parametrize("dtype", [torch.int64, torch.float32])
+def test_weights_of_another_type_are_refused(tmp_path: Path, dtype: torch.dtype) -> None:
     network, path = create_network("pointnet"), tmp_path / "w.safetensors"
     card = WeightsCard(network="pointnet", num_points=128)
-    tensors = {name: tensor.to(torch.int64) for name, tensor in network.state_dict().items()}
+    tensors = {name: tensor.to(dtype) for name, tensor in network.state_dict().items()}
     save_file(tensors, path, metadata={CARD_KEY: card.model_dump_json()})
-    with pytest.raises(WeightsError, match="int64"):
+    with pytest.raises(WeightsError) as caught:
         load_weights(path)
+    assert caught.value.path == path
+    assert tensors[str(caught.value.field)].is_floating_point() == dtype.is_floating_point
 
 
 @pytest.mark.parametrize("temperature", [0.0, 1e-300, 1e300, float("inf"), float("nan")])

@@ -30,7 +30,7 @@ def test_the_angle_is_within_two_degrees_and_binned_at_sixty(angle: int, wall: i
     assert result.state == (DoorState.OPEN if angle > 60 else DoorState.SEMI_OPEN)
 
 
-@settings(max_examples=15, deadline=None, derandomize=True)
+@settings(max_examples=15, derandomize=True)
 @given(angle=st.floats(18, 57), wall=st.floats(-30, 30), hinge=st.sampled_from(["left", "right"]))
 def test_the_side_of_the_hinge_does_not_matter(angle: float, wall: float, hinge: str) -> None:
     assume(edge_on_deg(angle, wall, hinge=hinge) > 15)

@@ -41,7 +41,7 @@ def test_a_surface_beyond_the_reach_leaves_the_way_free() -> None:
     assert DepthRegionRule(DepthRegionParameters(reach_m=2.0))(seen).state == DoorState.OPEN
 
 
-@settings(max_examples=25, deadline=None, derandomize=True)
+@settings(max_examples=25, derandomize=True)
 @given(seed=st.integers(0, 99), share=st.floats(0, 1), left=st.integers(0, 319), right=st.integers(0, 319))
 def test_no_loss_of_readings_opens_a_closed_door(seed: int, share: float, left: int, right: int) -> None:
     seen = see(door(0, distance_m=2.0))

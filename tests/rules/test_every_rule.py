@@ -25,7 +25,7 @@ def test_the_same_cloud_has_the_same_result(name: str) -> None:
         np.testing.assert_array_equal(before.points_m, after.points_m)
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60, derandomize=True)
 @given(
     name=st.sampled_from(list_rules()),
     seed=st.integers(0, 999),

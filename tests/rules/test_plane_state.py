@@ -31,7 +31,7 @@ def test_the_angle_is_within_two_degrees_on_both_sides_of_perpendicular(angle: i
     assert {shape.name for shape in result.detections} == {"wall", "leaf"}
 
 
-@settings(max_examples=15, deadline=None, derandomize=True)
+@settings(max_examples=15, derandomize=True)
 @given(
     angle=st.floats(15, 60),
     wall=st.floats(-30, 30),

@@ -8,6 +8,7 @@ import socket
 import httpx
 import pytest
 
+from doorstate.errors import ConfigError
 from doorstate.serving.access import Access
 from tests.serving.helpers import NPY, error_of, serving
 
@@ -46,6 +47,13 @@ def test_hosts(host: str, allowed: bool) -> None:
 def test_tokens(header: str, allowed: bool) -> None:
     assert Access(token="secret").allows_token(header) is allowed
     assert Access().allows_token(header)
+
+
+@pytest.mark.parametrize("token", ["", " ", "a b", "a\n", "é"])
+def test_tokens_that_protect_nothing_are_refused(token: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        Access(token=token)
+    assert caught.value.field == "token"
 
 
 def test_foreign_host_is_refused(client: httpx.Client) -> None:

@@ -38,7 +38,7 @@ def _status(body: bytes, headers: dict[str, str]) -> int:
     st.binary(max_size=200).filter(lambda content: content[:2] != b"\x1f\x8b"),  # files of gzip are unpacked
     st.text(st.characters(codec="utf-8", exclude_categories=["C"], exclude_characters="/\\"), max_size=20),
 )
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=100)
 def test_forms_of_httpx_are_read(content: bytes, stem: str) -> None:
     request = _form({"cloud": (f"a{stem}.csv", content, "text/plain")})
     for packed in (request.content, gzip.compress(request.content)):
@@ -51,7 +51,7 @@ def test_forms_of_httpx_are_read(content: bytes, stem: str) -> None:
 
 
 @given(st.binary(max_size=300))
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=100)
 def test_any_bytes_are_a_form_or_refused(body: bytes) -> None:
     with pytest.raises(HTTPException) as caught:
         read_body(body, {"content-type": "multipart/form-data; boundary=x"}, _LIMIT)

@@ -70,9 +70,11 @@ def test_worker_that_takes_too_long_or_ends_is_replaced() -> None:
         assert client.get("/health").json()["ready"]
 
 
-def test_broken_network_is_unhealthy() -> None:
-    with serving() as client:
-        response = client.post("/predict?format=npy", content=order(INVALID)).raise_for_status().json()
+@pytest.mark.parametrize("points", [500, 5000])
+def test_broken_network_is_unhealthy(points: int) -> None:
+    with serving(large_bytes=10_000) as client:
+        invalid = order(INVALID, points)
+        response = client.post("/predict?format=npy", content=invalid).raise_for_status().json()
         assert response["state"] is None
         health = client.get("/health")
         assert health.status_code == 503

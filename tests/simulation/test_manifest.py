@@ -20,7 +20,7 @@ _metres, _degrees = st.floats(-1e4, 1e4), st.floats(-3600, 3600)
 
 @example(x_m=0.0, angle=0.0, width=1.0, sample="\r")
 @given(x_m=_metres, angle=_degrees, width=_metres, sample=st.text(st.characters(codec="utf-8"), max_size=12))
-@settings(deadline=None, max_examples=80)
+@settings(max_examples=80)
 def test_every_row_reads_back(
     tmp_path_factory: pytest.TempPathFactory, x_m: float, angle: float, width: float, sample: str
 ) -> None:

@@ -37,7 +37,7 @@ def random_boxes(rng: np.random.Generator, pose: CameraPose, count: int) -> list
 
 
 @given(seed=st.integers(0, 2**32 - 1), is_level=st.booleans())
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 def test_rendering_equals_a_loop_over_rays_and_boxes(seed: int, is_level: bool) -> None:
     rng = np.random.default_rng(seed)
     x, y, z, yaw, pitch = rng.uniform(-3, 3, 5).tolist()
@@ -114,7 +114,7 @@ _LIMITS = np.array(
 
 @given(depth=npst.arrays(np.float32, 5, elements=st.floats(0, 10, width=32) | st.just(math.inf)))
 @example(depth=_LIMITS)
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 def test_the_range_excludes_its_limits(depth: np.ndarray) -> None:
     parts = np.arange(5, dtype=np.uint8)
     cut = cut_range(Render(depth[None], parts[None], parts[None].astype(np.int16)), DepthCamera())

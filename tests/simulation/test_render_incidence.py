@@ -34,7 +34,7 @@ def angle_to_face(box: Box, pose: CameraPose, row: int, column: int, depth_m: fl
 
 
 @given(seed=st.integers(0, 2**32 - 1))
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 def test_incidence_is_the_angle_between_the_ray_and_the_face_it_hits(seed: int) -> None:
     rng = np.random.default_rng(seed)
     yaw, pitch = rng.uniform(-1, 1, 2).tolist()

@@ -24,7 +24,7 @@ angles = st.floats(-0.6, 0.6)
 
 
 @given(yaw=st.floats(-3, 3), pitch=angles, roll=angles)
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 def test_a_tilted_camera_equals_a_loop_over_rays_and_boxes(yaw: float, pitch: float, roll: float) -> None:
     boxes = [
         Box(Part.FLOOR, (0.0, 0.0, -1.05), (20.0, 20.0, 0.1)),
@@ -39,7 +39,7 @@ def test_a_tilted_camera_equals_a_loop_over_rays_and_boxes(yaw: float, pitch: fl
 
 
 @given(pitch=st.floats(0, 0.6), roll=angles)
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 def test_levelled_points_of_a_floor_lie_on_the_floor(pitch: float, roll: float) -> None:
     floor = Box(Part.FLOOR, (0.0, 0.0, -1.05), (50.0, 50.0, 0.1))
     rendered = render([floor], CameraPose(0.0, 0.0, 0.0, 0.7, pitch, roll), CAMERA)

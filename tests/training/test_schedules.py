@@ -81,7 +81,7 @@ def test_rates_of_all_recipes_equal_the_formulas(name: str, network: str) -> Non
     ),
     per_epoch=st.integers(1, 9),
 )
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 def test_rates_of_any_recipe_equal_the_formulas(recipe: Recipe, per_epoch: int) -> None:
     expected = [oracle_rate(recipe, iteration, per_epoch) for iteration in range(recipe.epochs * per_epoch)]
     assert rates(recipe, per_epoch) == pytest.approx(expected, rel=1e-9)

@@ -13,19 +13,11 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from doorstate._paths import printable
+
 _PLAIN: dict[str, Any] = {"highlight": False, "markup": False, "emoji": False}  # file names may hold [ and :
 _PIPE_WIDTH = 160  # characters; piped tables must not be folded to a narrow default
 _NOT_IN_JSON = re.compile("[\x7f-\x9f\u200b-\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
-
-
-def printable(text: str) -> str:
-    """Return text with control characters, terminal escapes and broken characters written as escape sequences."""
-    return "".join(
-        character
-        if character.isprintable() or character == "\n"
-        else character.encode("unicode_escape").decode("ascii")
-        for character in text
-    )
 
 
 class PrintingConsole(Console):
@@ -53,14 +45,6 @@ def json_line(record: Mapping[str, Any]) -> str:
     """Return a JSON object in one line; characters that a terminal obeys are escaped, others are kept."""
     text = json.dumps(record, ensure_ascii=False)
     return _NOT_IN_JSON.sub(lambda match: f"\\u{ord(match[0]):04x}", text)
-
-
-def csv_name(name: str) -> str:
-    """Return a file name for a table that neither a spreadsheet nor a terminal obeys.
-
-    One that begins as a formula begins with `./`, and still names the same file; JSON has the exact names of all.
-    """
-    return printable(f"./{name}" if name[:1] in ("=", "+", "-", "@", "\t", "\r") else name)
 
 
 def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:

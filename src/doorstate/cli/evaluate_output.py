@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 
 from doorstate import __version__
 from doorstate._files import write_text
-from doorstate.cli.console import csv_name, print_table, stdout
+from doorstate._paths import csv_name
+from doorstate.cli.console import print_table, stdout
 from doorstate.cli.progress import progress_bar
 from doorstate.evaluation.tables import save_tables
 from doorstate.viewer.frame_page import choose_frames, make_cards, render_frame_page

@@ -11,7 +11,8 @@ from typing import Any, NamedTuple, TextIO
 
 import typer
 
-from doorstate.cli.console import csv_name, json_line, print_json
+from doorstate._paths import csv_name
+from doorstate.cli.console import json_line, print_json
 
 Rows = list[dict[str, Any]]
 """Predictions of all methods for one cloud, or one row with its `error`; each names its cloud."""

@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 
 from rich.text import Text
 
+from doorstate._paths import printable
 from doorstate.cli import console
-from doorstate.cli.console import printable
 from doorstate.types import ABSTAINED
 
 _STATE_STYLES = {"closed": "red", "semi_open": "yellow", "open": "green"}

@@ -97,15 +97,16 @@ def serve(
         client_connections=client_connections,
     )
     threads = threads or max(1, default_workers() // workers)
+    access = Access(allow_host or (), token)
     load = _loader(Methods(network, weights, rule), points, budget_ms, threads)
     listener = listen(host, port)
     work_queue = WorkQueue(load, limits)
     try:
         method = work_queue.wait_until_ready()
-        server = create_server(create_app(work_queue, Access(allow_host or (), token)), limits, verbose)
+        server = create_server(create_app(work_queue, access), limits, verbose)
         stop_on_signals(server)
         address = f"[{host}]" if ":" in host else host
-        if host in _ALL_ADDRESSES and token is None:
+        if listener.getsockname()[0] in _ALL_ADDRESSES and token is None:
             stderr.print(
                 f"doorstate: every machine that reaches {address} can use this service: there is no --token",
                 style="yellow",

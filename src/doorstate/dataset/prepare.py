@@ -12,6 +12,7 @@ from doorstate import __version__
 from doorstate._files import is_vacant, read_csv, write_csv
 from doorstate._jobs import Progress, Shard, default_workers, no_progress, piece_paths, run_pieces
 from doorstate._locks import owned_folder
+from doorstate._paths import check_encoding, csv_name
 from doorstate.dataset.frame_index import IndexedOptions
 from doorstate.dataset.layouts import find_layout
 from doorstate.dataset.pieces import PieceClouds, SavedPieces
@@ -118,7 +119,9 @@ def assemble(
             f"none of the {len(rows)} clouds could be prepared; the first: {rejected[0]['reason']}"
         )
     if rejected:
-        write_csv(folder / REJECTED, rejected)
+        write_csv(
+            folder / REJECTED, [{name: csv_name(text) for name, text in row.items()} for row in rejected]
+        )
     saved.join_clouds(folder / CLOUDS_FILE, preparation.spec.num_points)
     if preparation.is_simulated:
         saved.join_parts(folder / PARTS_FILE, preparation.spec.num_points)
@@ -168,6 +171,7 @@ def _prepare_piece(piece: _Piece, path: Path) -> None:
             clouds.add(samples_of_frame(row, _replay(row), spec, crops))
             continue
         try:
+            check_encoding(line["file"])
             file = preparation.source / line["file"]
             options = indexed.of(file) if preparation.layout is None else preparation.options
             clouds.add(samples_of_recording(line, read(file, options), spec, crops))

@@ -7,6 +7,7 @@ environment and epoch log of every run. The same results give the same bytes.
 
 from __future__ import annotations
 
+import io
 import json
 import warnings
 import zlib
@@ -17,9 +18,9 @@ from typing import Any
 import pandas as pd
 
 from doorstate._documents import read_json
-from doorstate._files import write_compressed_text, write_text
+from doorstate._files import read_table_text, write_compressed_text, write_text
 from doorstate.dataset.splits import write_splits
-from doorstate.errors import RunError
+from doorstate.errors import DatasetError, RunError
 from doorstate.evaluation.results import KEY_COLUMNS, TEXT_COLUMNS, Results, RunRecord
 
 EXPERIMENT, METRICS = "experiment.json", "metrics.json"
@@ -58,16 +59,16 @@ def read_predictions(path: Path) -> pd.DataFrame:
             warnings.simplefilter("error", pd.errors.ParserWarning)
             warnings.simplefilter("error", RuntimeWarning)  # NumPy's, for what is no whole number
             frame = pd.read_csv(
-                path,
+                io.StringIO(read_table_text(path)),
                 dtype={**dict.fromkeys(TEXT_COLUMNS, "str"), "fold": "int64"},
                 keep_default_na=False,
                 na_values=[""],
                 index_col=False,
-                compression="gzip",
             )
         numeric = [name for name in frame if name not in (*TEXT_COLUMNS, "fold")]
         frame = frame.astype(dict.fromkeys(numeric, "float64"))
     except (
+        DatasetError,
         OSError,
         EOFError,
         zlib.error,
@@ -76,7 +77,8 @@ def read_predictions(path: Path) -> pd.DataFrame:
         pd.errors.ParserWarning,
         RuntimeWarning,
     ) as error:
-        raise RunError(f"cannot be read ({error})", path=path) from error
+        reason = error.message if isinstance(error, DatasetError) else error
+        raise RunError(f"cannot be read ({reason})", path=path) from error
     for name in KEY_COLUMNS:
         if name not in frame:
             raise RunError("column is missing", path=path, field=name)

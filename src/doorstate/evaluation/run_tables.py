@@ -7,6 +7,7 @@ import math
 
 import pandas as pd
 
+from doorstate._paths import csv_name
 from doorstate.evaluation.errors import RANGES, list_errors, summarize_errors
 from doorstate.evaluation.method_scores import fold_scores
 from doorstate.evaluation.results import PROBABILITY_COLUMNS, Results
@@ -74,9 +75,11 @@ def runs_table(results: Results) -> Table:
 
 def misclassified_table(results: Results) -> Table:
     """Build the table of every misclassified sample."""
+    errors = list_errors(results)
+    names = [name for name in ("sample_id", "same_image_as") if name in errors]
     return Table.from_frame(
         "Misclassified samples",
-        list_errors(results),
+        errors.assign(**{name: errors[name].map(csv_name, na_action="ignore") for name in names}),
         (
             _METHOD,
             Column("fold", ("fold",), str, is_label=True),

@@ -63,9 +63,10 @@ def load_into(network: PointNetwork, path: Path) -> None:
     tensors = load(read_weights_file(path))
     own = network.state_dict()
     for name, tensor in tensors.items():
-        is_float = name in own and own[name].is_floating_point()
-        if is_float and tensor.dtype not in _FLOATS:
-            raise WeightsError(f"holds {tensor.dtype}", path=path, field=name, expected="float16 or float32")
+        types = _FLOATS if name in own and own[name].is_floating_point() else (torch.int64,)
+        if name in own and tensor.dtype not in types:
+            expected = " or ".join(map(str, types))
+            raise WeightsError(f"holds {tensor.dtype}", path=path, field=name, expected=expected)
         if not torch.isfinite(tensor).all():
             raise WeightsError("holds numbers that are not finite: damaged", path=path, field=name)
     network.load_state_dict(

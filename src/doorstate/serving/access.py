@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import hmac
 import ipaddress
+import re
 import socket
 from collections.abc import Collection
 from dataclasses import dataclass
@@ -14,6 +15,9 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.responses import JSONResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from doorstate.errors import ConfigError
+
+_TOKEN = re.compile(r"[\x21-\x7e]+")
 _OPEN_PATHS = {"/health"}  # for load balancers and supervisors, without a token
 _HEADERS = {
     "Cache-Control": "no-store",
@@ -33,10 +37,20 @@ class Access:
         hosts: names in the Host header, besides addresses, localhost and the name of this machine. A web page whose
             name resolves to this machine (DNS rebinding) has another name.
         token: bearer token of every request but `/health`; None asks for none.
+
+    Raises:
+        ConfigError: the token is empty, or has characters that no header can hold.
     """
 
     hosts: Collection[str] = ()
     token: str | None = None
+
+    def __post_init__(self) -> None:
+        # Anybody can send an empty one: it is that of a variable that was not set.
+        if self.token is not None and not _TOKEN.fullmatch(self.token):
+            raise ConfigError(
+                "is no token", field="token", expected="letters, digits and signs, without blanks"
+            )
 
     def allows_host(self, host: str) -> bool:
         """Return True if a Host header is served."""

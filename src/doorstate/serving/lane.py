@@ -46,7 +46,6 @@ class Lane:
         self._is_closed = False
         self._tasks: set[asyncio.Task[None]] = set()
         self.taken = 0
-        self.problem = ""
 
     async def wait_for_space(self, client: str) -> None:
         """Wait until a file may be received."""
@@ -107,7 +106,6 @@ class Lane:
             self._files.charge(client, done.seconds)
             self._unread.charge(client, max(0.0, done.seconds - self._usual_s))
             self._usual_s += _WEIGHT * (done.seconds - self._usual_s)
-            self.problem = done.reply.fault
             if not file.done.done():
                 file.done.set_result(done)
         finally:

@@ -37,6 +37,8 @@ class WorkQueue:
         self._credit = Credit(limits.failure_s, limits.failure_share)
         self._quick = Lane([Worker(load, limits) for _ in range(limits.workers)], limits.queue)
         self._large = Lane([Worker(load, limits, LOW_PRIORITY)], max(1, limits.queue // 8))
+        self.problem = ""
+        """Reason why the last file could not be predicted, whatever the file; empty while the workers do their work."""
 
     async def wait_for_space(self, client: str, size: int, suffix: str | None) -> None:
         """Wait until a file may be received.
@@ -71,6 +73,11 @@ class WorkQueue:
             job: file to predict.
             client: name of the client.
         """
+        reply = await self._run(job, client)
+        self.problem = reply.fault
+        return reply
+
+    async def _run(self, job: Job, client: str) -> Reply:
         size = len(job.content)
         is_large = self._is_large(size, _is_text(job.content))
         if not is_large and not self._credit.seconds_in_debt(client):
@@ -95,11 +102,6 @@ class WorkQueue:
 
     def _is_large(self, size: int, is_text: bool) -> bool:
         return size >= (self.limits.large_text_bytes if is_text else self.limits.large_bytes)
-
-    @property
-    def problem(self) -> str:
-        """Reason why no file can be predicted; empty while the workers do their work."""
-        return self._quick.problem
 
     @property
     def is_busy(self) -> bool:

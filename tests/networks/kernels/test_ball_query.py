@@ -30,7 +30,7 @@ def test_ball_query_by_hand(radius: float, num_samples: int, expected: list[int]
     assert ball_query(LINE[:, :1], LINE, radius, num_samples).tolist() == [[expected]]
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(st.integers(0, 10**6), st.sampled_from([0.1, 0.5, 1.0, 3.0]), st.integers(1, 12))
 def test_ball_query_equals_its_plain_twin(seed: int, radius: float, num_samples: int) -> None:
     points = (

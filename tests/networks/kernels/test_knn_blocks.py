@@ -34,7 +34,7 @@ def test_neighbours_in_blocks_are_those_of_all_distances(dimensions: int, k: int
     assert all(len(set(row.tolist())) == k for row in neighbours.flatten(0, 1)[::37])
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(st.integers(0, 10**6), st.sampled_from([1024, 1152, 1536]), st.floats(0.01, 100), st.floats(-50, 50))
 def test_neighbours_in_blocks_of_surfaces(seed: int, count: int, size: float, shift: float) -> None:
     points = random_rows(1, count, 3, seed=seed)

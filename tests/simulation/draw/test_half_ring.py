@@ -56,7 +56,7 @@ def test_a_heading_depends_on_seed_and_position_only() -> None:
 
 
 @given(count=st.integers(1, 1353))
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 def test_a_reduced_ring_has_the_requested_size(count: int) -> None:
     indices = reduced_ring(count)
     assert indices == sorted(set(indices))

@@ -54,7 +54,7 @@ STAGES: dict[str, Callable[[DepthImage, np.random.Generator], DepthImage]] = {
 
 @pytest.mark.parametrize("stage", STAGES.values(), ids=STAGES)
 @given(depth_m=depths, seed=st.integers(0, 99))
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 def test_lost_pixels_stay_lost_and_the_input_is_unchanged(
     stage: Callable[[DepthImage, np.random.Generator], DepthImage], depth_m: DepthImage, seed: int
 ) -> None:
@@ -70,7 +70,7 @@ def test_lost_pixels_stay_lost_and_the_input_is_unchanged(
 
 
 @given(row=st.lists(st.sampled_from([0.5, 0.8, 1.0, 1.5, 2.0, 3.1, 5.0, math.inf]), min_size=2, max_size=30))
-@settings(deadline=None, max_examples=200)
+@settings(max_examples=200)
 def test_shadows_equal_a_loop_over_pairs_of_pixels(row: list[float]) -> None:
     depth_m = np.array([row, row[::-1]], np.float32)
     hidden = np.isnan(hide_from_second_view(depth_m, SecondView(baseline_m=0.01), 512.0))
@@ -122,7 +122,7 @@ def test_shadows_of_an_upright_camera_lie_above_the_object() -> None:
 
 
 @given(depth_m=depths)
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 def test_rounding_disparity_moves_depth_by_at_most_half_a_step(depth_m: DepthImage) -> None:
     rounded = round_disparity(depth_m, STEPS, FOCAL_PX)
     finite = np.isfinite(rounded)

@@ -35,7 +35,7 @@ def vertical_edge(leaf: Box, x_sign: float, y_sign: float) -> np.ndarray:
     width=st.floats(0.6, 1.2),
     wall=st.floats(0.08, 0.3),
 )
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 def test_the_leaf_turns_about_a_fixed_hinge(
     hinge: Hinge, swing: Swing, angle_deg: float, width: float, wall: float
 ) -> None:

@@ -37,7 +37,7 @@ def sampled(box: Box) -> np.ndarray:
 
 
 @given(first=boxes, second=boxes)
-@settings(deadline=None, max_examples=150)
+@settings(max_examples=150)
 def test_boxes_collide_if_one_contains_a_point_of_the_other(first: Box, second: Box) -> None:
     overlap = collide([first], [second], 0.0)
     assert overlap == collide([second], [first], 0.0)
@@ -59,7 +59,7 @@ def test_a_tolerance_lets_boxes_touch_and_slightly_overlap() -> None:
 
 
 @given(first=boxes, second=boxes)
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 def test_the_distance_is_that_of_the_nearest_edge_points(first: Box, second: Box) -> None:
     steps = np.linspace(0, 1, 80)[:, None]
     edges = []

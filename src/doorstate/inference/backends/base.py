@@ -48,11 +48,17 @@ class Outputs(NamedTuple):
                 {
                     name: float(column[number])
                     for name, column in self.heads.items()
-                    if self.withheld is None or not (self.withheld[number] and np.isnan(column[number]))
+                    if not self._is_withheld(number, name)
                 },
             )
             for number, row in enumerate(self.probabilities)
         ]
+
+    def _is_withheld(self, number: int, name: str) -> bool:
+        """Return True for a head that an exported network does not give; the probability of a door it always gives."""
+        if self.withheld is None or not self.withheld[number] or name == "p_door":
+            return False
+        return bool(np.isnan(self.heads[name][number]))
 
 
 class Backend(Protocol):

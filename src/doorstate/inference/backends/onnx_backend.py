@@ -6,7 +6,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from doorstate.errors import WeightsError, summarize_exception
+from doorstate.inference.abstention import AbstentionCode
 from doorstate.inference.backends.base import Outputs
 from doorstate.inference.backends.threads import default_threads
 from doorstate.networks.card import CARD_KEY, WeightsCard
@@ -18,6 +22,19 @@ from doorstate.types import PARTS, STATES, Points
 INPUT, REASON = "points", "reason"
 PROBABILITIES, RAW_PROBABILITIES = "probabilities", "raw_probabilities"
 """Outputs: probabilities, zero where the state is refused, and those that the network computed in any case."""
+REASONS: tuple[AbstentionCode | None, ...] = (
+    None,
+    "unusable_cloud",  # a point is not finite, (0, 0, 0), or beyond the range or the box of the training clouds
+    "points_behind_camera",
+    "too_near",
+    "too_far",
+    "too_small",
+    "narrow_view",
+    "invalid_outputs",
+    "no_door",
+    "unsure",
+)
+"""Reasons by their number in the output `reason`; the first that holds is given."""
 TENSOR_PREFIX = "weights."  # of names of tensors that a graph takes from a weights file
 _LOG_ERRORS_ONLY = 3
 # Parts of onnxruntime's messages about files that are newer than itself.
@@ -62,7 +79,13 @@ class OnnxBackend:
         probabilities, *others = self._session.run(names, {INPUT: points})
         values = dict(zip(self._heads, others, strict=False))
         columns = head_columns(values, self.card.normalization.placement(points))
-        return Outputs(probabilities, columns, others[-1] != 0 if self._refuses else None)
+        return Outputs(probabilities, columns, self._withheld(others[-1]) if self._refuses else None)
+
+    @staticmethod
+    def _withheld(reasons: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Return (B,) True where heads are not given; those of invalid outputs are, so that they are noticed."""
+        withheld: NDArray[np.bool_] = (reasons != 0) & (reasons != REASONS.index("invalid_outputs"))
+        return withheld
 
 
 def head_names(card: WeightsCard) -> tuple[str, ...]:

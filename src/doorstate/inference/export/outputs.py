@@ -8,8 +8,14 @@ from dataclasses import asdict
 from typing import NamedTuple
 
 from doorstate.clouds.normalization import Input
-from doorstate.inference.backends.onnx_backend import PROBABILITIES, RAW_PROBABILITIES, REASON, head_names
-from doorstate.inference.export.refusals import REASONS, REFUSED
+from doorstate.inference.backends.onnx_backend import (
+    PROBABILITIES,
+    RAW_PROBABILITIES,
+    REASON,
+    REASONS,
+    head_names,
+)
+from doorstate.inference.export.refusals import REFUSED
 from doorstate.inference.gate import Gate
 from doorstate.networks.card import WeightsCard
 from doorstate.networks.heads import HEADS, STATE

@@ -14,25 +14,12 @@ import torch
 from torch import Tensor, nn
 
 from doorstate.doorways.crop import DEFAULT_CROP
-from doorstate.inference.abstention import AbstentionCode
+from doorstate.inference.backends.onnx_backend import REASONS
 from doorstate.inference.gate import Gate
 from doorstate.inference.validity import SUM_TOLERANCE
 from doorstate.networks.card import WeightsCard
 from doorstate.types import DECISION_THRESHOLD, DOOR
 
-REASONS: tuple[AbstentionCode | None, ...] = (
-    None,
-    "unusable_cloud",  # a point is not finite, (0, 0, 0), or beyond the range or the box of the training clouds
-    "points_behind_camera",
-    "too_near",
-    "too_far",
-    "too_small",
-    "narrow_view",
-    "invalid_outputs",
-    "no_door",
-    "unsure",
-)
-"""Reasons by their number in the output `reason`; the first that holds is given."""
 REFUSED = -1  # in the output `state`
 _ROUNDING_M = 1e-3
 _BEHIND_SHARE = 0.25  # chosen: sampling picks stray points first; an optical frame or a scan has half
