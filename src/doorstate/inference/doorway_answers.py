@@ -1,18 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Doors from the outputs of a network for the crops of one cloud: placed, merged where they overlap, and decided.
+"""Doors from the outputs of a network for the crops of one cloud: placed, one for each place, and decided.
 
 The network corrects place, direction and width of each candidate in the doorway's frame. Candidates whose corrected
-openings overlap on nearly the same wall are one door, and their outputs are averaged by the probability of a door.
+openings overlap on nearly the same wall are one door: the one that finder and network together hold likeliest. They
+are rival proposals, half a metre apart as a rule, so that a mean of them would be beside the door.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from doorstate.doorways.doorway import Doorway
 from doorstate.doorways.finder import FINDER_ERRORS, Correction
@@ -20,16 +20,14 @@ from doorstate.inference.abstention import Abstention
 from doorstate.inference.backends.base import CloudOutputs
 from doorstate.inference.decode import abstention_of, leaf_fields
 from doorstate.inference.door import Door, DoorFrame
-from doorstate.inference.pose_errors import FINDER_POSITION_M, Scatter, door_errors
+from doorstate.inference.pose_errors import FINDER_POSITION_M, door_errors
 from doorstate.networks.card import WeightsCard
 from doorstate.types import DECISION_THRESHOLD, DOOR, STATES, DoorState
-
-Floats = NDArray[np.float64]
 
 # Chosen: as wide as the finder's usual errors of two candidates of one door; walls of a recess are farther apart.
 _SAME_WALL_M, _SAME_WALL_DEG = 0.3, 20.0
 _MIN_WIDTH_M = 0.4  # of a door; a network that is unsure of all may give zero
-_MIN_OVERLAP = 0.5  # of the narrower opening; neighbouring doors share no more than a jamb
+_MIN_OVERLAP = 0.25  # of the narrower opening; neighbouring doors share no more than a jamb
 
 
 class Answer(NamedTuple):
@@ -43,6 +41,12 @@ class Answer(NamedTuple):
     def door_probability(self) -> float:
         """Probability of a door; 1 without the head for it."""
         return self.outputs.heads.get("p_door", 1.0)
+
+    @property
+    def rank(self) -> tuple[bool, float, float]:
+        """Order among candidates, the likeliest last: what the network calls a door, then by finder and network."""
+        probability = self.door_probability
+        return probability >= DECISION_THRESHOLD, probability * self.doorway.score, probability
 
     @property
     def correction(self) -> Correction:
@@ -62,6 +66,13 @@ class Answer(NamedTuple):
         """Width of the opening, by the network where it gives one that a door can have."""
         width_m = self.outputs.heads.get("opening_width_m", 0.0)
         return width_m if width_m >= _MIN_WIDTH_M else self.doorway.width_m
+
+    @property
+    def leaf(self) -> dict[str, Any]:
+        """Angle, hinge and passage, which is no wider than the opening."""
+        fields = leaf_fields(self.outputs.heads)
+        passable_m = fields["passable_width_m"]
+        return fields | {"passable_width_m": None if passable_m is None else min(passable_m, self.width_m)}
 
 
 class DecidedDoors(NamedTuple):
@@ -117,7 +128,7 @@ def refused_candidate(doorway: Doorway, abstention: Abstention) -> Door:
 def _group(answers: Sequence[Answer]) -> list[list[Answer]]:
     """Return the answers by door; the likeliest of each is the first."""
     groups: list[list[Answer]] = []
-    for answer in sorted(answers, key=lambda answer: (-answer.door_probability, -answer.doorway.score)):
+    for answer in sorted(answers, key=lambda answer: answer.rank, reverse=True):
         for group in groups:
             if _overlap(group[0], answer):
                 group.append(answer)
@@ -142,59 +153,25 @@ def _overlap(first: Answer, second: Answer) -> bool:
 
 def _decide(group: Sequence[Answer], card: WeightsCard, door_known: bool) -> Door:
     """Return the door of overlapping candidates, with a state or the reason why there is none."""
-    members = [answer for answer in group if answer.door_probability >= DECISION_THRESHOLD] or group[:1]
-    leader = members[0]
-    weights = np.array([answer.door_probability for answer in members])
-    shares: Floats = weights / weights.sum() if weights.sum() > 0 else np.ones(1)
-    yaw_deg = leader.frame.yaw_deg
-    frames = np.array(
-        [(x_m, y_m, _turned(yaw - yaw_deg)) for x_m, y_m, yaw in (answer.frame for answer in members)]
-    )
-    x_m, y_m, turn_deg = (shares @ frames).tolist()
-    outputs = _mean_outputs(members, shares)
+    answer = group[0]
+    x_m, y_m, yaw_deg = answer.frame
+    outputs = answer.outputs
     abstention = abstention_of(outputs, card.abstain_below, door_known=door_known)
     state = DoorState.from_index(int(outputs.probabilities.argmax()))
     door = Door(
         x_m,
         y_m,
-        _turned(yaw_deg + turn_deg),
-        float(shares @ [answer.width_m for answer in members]),
+        yaw_deg,
+        answer.width_m,
         state,
         raw_probabilities=dict(zip(STATES, outputs.probabilities.tolist(), strict=True)),
         door_probability=outputs.heads.get("p_door"),
-        **leaf_fields(outputs.heads),
-        **door_errors(card, leader.correction, _scatter(members, frames, shares), state)._asdict(),
-        floor_z_m=leader.doorway.floor_z_m,
-        score=max(answer.doorway.score for answer in members),
+        **answer.leaf,
+        **door_errors(card, answer.correction, state)._asdict(),
+        floor_z_m=answer.doorway.floor_z_m,
+        score=answer.doorway.score,
     )
     return door if abstention is None else door.refuse(abstention)
-
-
-def _scatter(members: Sequence[Answer], frames: Floats, shares: Floats) -> Scatter:
-    """Return the standard deviations of the answers (K) with frames (K, 3), weighted by shares (K,)."""
-    angles_deg = np.array([answer.outputs.heads.get("opening_angle_deg", 0.0) for answer in members])
-    values = np.column_stack([frames, angles_deg])
-    x, y, yaw, angle = (shares @ (values - shares @ values) ** 2).tolist()
-    return Scatter(math.sqrt(x + y), math.sqrt(yaw), math.sqrt(angle))
-
-
-def _mean_outputs(members: Sequence[Answer], shares: Floats) -> CloudOutputs:
-    """Return the weighted mean of the outputs, with the largest probability of a door.
-
-    Exported networks withhold heads of crops that they refuse; the others give the mean.
-    """
-    probabilities = (shares @ [answer.outputs.probabilities for answer in members]).astype(np.float32)
-    heads = {}
-    for name in {name: None for answer in members for name in answer.outputs.heads}:
-        given = np.array([answer.outputs.heads.get(name, math.nan) for answer in members])
-        is_given = ~np.isnan(given)
-        heads[name] = float(shares[is_given] @ given[is_given] / shares[is_given].sum())
-    if "p_door" in heads:
-        heads["p_door"] = members[0].door_probability
-    if "passable_width_m" in heads:
-        width_m = float(shares @ [answer.width_m for answer in members])
-        heads["passable_width_m"] = min(heads["passable_width_m"], width_m)
-    return CloudOutputs(probabilities, heads)
 
 
 def _turned(angle_deg: float) -> float:

@@ -2,7 +2,7 @@
 """Network for crops: from a raw, tilted cloud to every door in it.
 
 Each cloud is cleaned, checked, turned level and searched for doorways; the crops of all candidates pass the network
-together. Its answers are placed in the level sensor frame, merged where they overlap, and checked one by one.
+together. Its answers are placed in the level sensor frame, the likeliest of those that overlap, and checked one by one.
 """
 
 from __future__ import annotations

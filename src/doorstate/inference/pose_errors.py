@@ -2,8 +2,7 @@
 """Standard errors of a door's place, direction and opening angle.
 
 A network learns from crops with the finder's errors and corrects them; what is left is measured on validation doors
-(`WeightsCard.errors`). A correction larger than the finder's usual error makes the errors larger in proportion, and so
-does the scatter of overlapping candidates after their corrections.
+(`WeightsCard.errors`). A correction larger than the finder's usual error makes the errors larger in proportion.
 """
 
 from __future__ import annotations
@@ -18,14 +17,6 @@ from doorstate.types import DoorState
 FINDER_POSITION_M = math.hypot(FINDER_ERRORS.along_m, FINDER_ERRORS.across_m)
 
 
-class Scatter(NamedTuple):
-    """Standard deviations of overlapping candidates after their corrections; zero for a single one."""
-
-    position_m: float
-    yaw_deg: float
-    angle_deg: float
-
-
 class DoorErrors(NamedTuple):
     """Standard errors of a door; None for the angle where they are not known."""
 
@@ -34,13 +25,12 @@ class DoorErrors(NamedTuple):
     angle_error_deg: float | None
 
 
-def door_errors(card: WeightsCard, correction: Correction, scatter: Scatter, state: DoorState) -> DoorErrors:
+def door_errors(card: WeightsCard, correction: Correction, state: DoorState) -> DoorErrors:
     """Return the standard errors of a door.
 
     Args:
         card: card of the weights; without measured errors, those of the finder hold for place and direction.
-        correction: correction of the likeliest candidate.
-        scatter: scatter of all candidates of the door.
+        correction: correction of the candidate.
         state: state of the door, on which the error of the angle depends.
     """
     measured = card.errors
@@ -49,8 +39,4 @@ def door_errors(card: WeightsCard, correction: Correction, scatter: Scatter, sta
     angle_deg = None if measured is None else measured.angle_deg.get(state)
     ratios = [value / usual for value, usual in zip(correction, FINDER_ERRORS, strict=True)]
     growth = max(1.0, math.sqrt(sum(ratio**2 for ratio in ratios) / len(ratios)))
-    return DoorErrors(
-        math.hypot(growth * position_m, scatter.position_m),
-        math.hypot(growth * yaw_deg, scatter.yaw_deg),
-        None if angle_deg is None else math.hypot(angle_deg, scatter.angle_deg),
-    )
+    return DoorErrors(growth * position_m, growth * yaw_deg, angle_deg)
