@@ -46,3 +46,14 @@ def test_the_frame_is_the_door_frame_of_the_simulator() -> None:
     leaf = points[frame.cut.part == Part.LEAF]
     assert floor[:, 2] == pytest.approx(0, abs=2e-3)
     assert np.abs(np.median(leaf[:, 0])) < width_m / 2
+
+
+@pytest.mark.parametrize("shape", [(3,), (1, 3), (40, 3), (5, 6, 3)])
+def test_points_of_any_shape_equal_one_product(shape: tuple[int, ...]) -> None:
+    doorway = Doorway(2.5, -0.3, 77.0, 0.9, -1.1)
+    points = np.random.default_rng(0).normal(0, 3, shape).astype(np.float32)
+    turned = doorway.to_doorway(points)
+    plain = (points - np.array([2.5, -0.3, -1.1], np.float32)) @ doorway._axes().T
+    assert turned.shape == shape
+    assert turned.dtype == np.float32
+    np.testing.assert_allclose(turned, plain, rtol=0, atol=2e-6)

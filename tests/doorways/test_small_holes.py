@@ -3,10 +3,14 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from doorstate.doorways.small_holes import fill_small_holes
+from doorstate.doorways.small_holes import _short_runs, _small_holes, fill_small_holes
 from doorstate.types import Points
 
 _CAMERA_M = np.array([0.3, 2.5, 1.0], np.float32)
@@ -59,3 +63,26 @@ def test_no_points_and_no_wall_before_the_camera() -> None:
     assert len(fill_small_holes(np.empty((0, 3), np.float32), _CAMERA_M).points) == 0
     behind = np.array([0.0, -1.0, 1.0], np.float32)
     assert len(fill_small_holes(_wall(), behind).points) == 0
+
+
+def _plain_short_runs(empty: np.ndarray, most: int) -> np.ndarray:
+    """Return the short runs by a loop over all pairs of filled cells."""
+    short = np.zeros_like(empty)
+    for column in range(empty.shape[1]):
+        filled = np.flatnonzero(~empty[:, column]).tolist()
+        for first, second in pairwise(filled):
+            if second - first - 1 <= most:
+                short[first + 1 : second, column] = True
+    return short
+
+
+@given(st.integers(0, 10_000), st.floats(0.05, 0.9), st.integers(1, 4))
+def test_short_runs_equal_those_of_a_loop(seed: int, share: float, most: int) -> None:
+    empty = np.random.default_rng(seed).random((12, 9)) < share
+    assert (_short_runs(empty, most) == _plain_short_runs(empty, most)).all()
+
+
+def test_cells_of_a_hole_are_in_order() -> None:
+    counts = np.ones((9, 8), np.int64)
+    counts[2:4, 3:5] = counts[6, 2] = counts[6, 5:7] = 0
+    assert _small_holes(counts) == [[(2, 3), (2, 4), (3, 3), (3, 4)], [(6, 5), (6, 6)]]

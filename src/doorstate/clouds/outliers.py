@@ -58,7 +58,7 @@ def remove_outliers(cloud: Points) -> CleanCloud:
     if count == 0:
         return CleanCloud(cloud, 0.0)
     points = cloud.astype(np.result_type(cloud, np.float32))
-    points[outliers] = np.nan
+    points[_places(outliers)] = np.nan
     return CleanCloud(points, count / int(np.count_nonzero(levels != _MISSING)))
 
 
@@ -103,8 +103,7 @@ def _image_outliers(levels: NDArray[np.int16], measured: NDArray[np.bool_]) -> N
     _add_support(support, levels, near)
     if _typical(support, measured) == 4 * len(near):
         # A dense image: hardly any pixel is left to be compared with those farther away.
-        # Rows and columns of a flat index: searching a plane takes ten times as long.
-        rest = np.unravel_index(np.flatnonzero(measured & (support < _MIN_SUPPORT)), support.shape)
+        rest = _places(measured & (support < _MIN_SUPPORT))
         if len(rest[0]) < _MAX_REST * support.size:
             outliers = np.zeros_like(measured)
             outliers[rest] = support[rest] + _support_of(levels, rest, far) < _MIN_SUPPORT
@@ -114,6 +113,12 @@ def _image_outliers(levels: NDArray[np.int16], measured: NDArray[np.bool_]) -> N
     if typical < _SPARSE_SUPPORT:
         return None
     return measured & (support < min(_MIN_SUPPORT, int(_SUPPORT_SHARE * typical)))
+
+
+def _places(mask: NDArray[np.bool_]) -> tuple[NDArray[np.intp], ...]:
+    """Return the indices of what a mask selects."""
+    # Rows and columns of a flat index: searching a plane takes ten times as long.
+    return np.unravel_index(np.flatnonzero(mask), mask.shape)
 
 
 def _typical(support: NDArray[np.uint8], measured: NDArray[np.bool_]) -> int:

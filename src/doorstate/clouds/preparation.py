@@ -91,7 +91,7 @@ def distinct_farthest_points(
     """
     sampled = farthest_point_indices(points, min(count, len(points)), sampler, points_per_leaf)
     # Sampling repeats a point only after all distinct ones, so the repeats are at the end.
-    return sampled[: len(np.unique(sampled))]
+    return sampled[: np.count_nonzero(np.bincount(sampled))]
 
 
 def _candidates(cloud: Points, spec: CloudSpec) -> tuple[Indices, Points]:

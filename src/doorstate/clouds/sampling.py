@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from doorstate.clouds.coordinates import coordinates
 from doorstate.clouds.samplers import Sampler, choose_sampler
 from doorstate.types import Indices, Points
 
@@ -43,8 +44,9 @@ def farthest_point_indices(
         raise ValueError(f"cannot choose {count} of {len(points)} points")
     if not np.isfinite(points).all():
         raise ValueError("points must be finite: drop NaN rows")
-    lowest = points.min(axis=0)
-    diagonal = np.float32(np.linalg.norm(points.max(axis=0) - lowest) + 1.0)
+    xyz = coordinates(points)
+    lowest = xyz.min(axis=1)
+    diagonal = np.float32(np.linalg.norm(xyz.max(axis=1) - lowest) + 1.0)
     with_anchor = np.concatenate([(lowest - diagonal)[None], points])
     height = max(1, int(np.log2(len(with_anchor) / points_per_leaf)))
     sampler = sampler or choose_sampler()

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from doorstate._models import FrozenModel
+from doorstate.clouds.coordinates import coordinates
 from doorstate.clouds.measured import is_measured
 from doorstate.clouds.preparation import (
     MAX_NUM_POINTS,
@@ -96,7 +97,7 @@ def crop_cloud(
     sampled = distinct_farthest_points(points, spec.num_points, sampler, _POINTS_PER_LEAF)
     if len(sampled) < least:
         raise too_few_points(f"{len(sampled)} distinct of {len(points)} measured around the doorway")
-    return PreparedCloud(points[sampled], rows[sampled])
+    return PreparedCloud(np.ascontiguousarray(points[sampled]), rows[sampled])
 
 
 def _inside(flat: Points, doorway: Doorway, spec: CropSpec) -> tuple[Indices, Points]:
@@ -104,7 +105,7 @@ def _inside(flat: Points, doorway: Doorway, spec: CropSpec) -> tuple[Indices, Po
     with np.errstate(invalid="ignore", over="ignore"):  # infinite, or as large as some drivers write
         points = doorway.to_doorway(np.asarray(flat, dtype=np.float32))
         rows = np.flatnonzero(spec.contains(points) & is_measured(flat))
-    return rows, points[rows]
+    return rows, points.T.take(rows, axis=1).T
 
 
 def _inside_of_image(image: Points, doorway: Doorway, spec: CropSpec) -> tuple[Indices, Points]:
@@ -138,7 +139,7 @@ def _inside_of_grid(image: Points, grid: _Grid, doorway: Doorway, spec: CropSpec
     """Return the same of some rows and columns of an image."""
     height, width, _ = image.shape
     pixels = np.arange(height)[grid.rows, None] * width + np.arange(width)[grid.columns]
-    rows, points = _inside(image[grid].reshape(-1, 3), doorway, spec)
+    rows, points = _inside(coordinates(image[grid]).T, doorway, spec)
     return pixels.reshape(-1)[rows], points
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from doorstate.clouds.coordinates import coordinates
 from doorstate.types import Points
 
 
@@ -39,8 +40,8 @@ class Doorway:
 
     def to_doorway(self, points: Points) -> Points:
         """Return points (..., 3) of the sensor frame in the doorway's frame, float32."""
-        moved = points - np.array([self.x_m, self.y_m, self.floor_z_m], np.float32)
-        turned: Points = moved @ self._axes().T
+        moved = coordinates(points) - np.array([[self.x_m], [self.y_m], [self.floor_z_m]], np.float32)
+        turned: Points = (self._axes() @ moved).T.reshape(points.shape)
         return turned
 
     def to_sensor(self, points: Points) -> Points:

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from doorstate.clouds.coordinates import coordinates
 from doorstate.doorways.plan_lines import Floats
 from doorstate.doorways.walls import Wall
 from doorstate.types import Indices
@@ -61,7 +62,7 @@ class SightLines(NamedTuple):
     @classmethod
     def to(cls, points: NDArray[np.float32]) -> SightLines:
         """Return the sight lines to measured points (N, 3), metres, level sensor frame."""
-        x, y, _ = ends_m = np.ascontiguousarray(points.T)
+        x, y, _ = ends_m = coordinates(points)
         return cls(ends_m, np.float32(_MIN_FORWARD) * np.sqrt(x * x + y * y))
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from doorstate._models import FrozenModel
+from doorstate.clouds.coordinates import coordinates
 from doorstate.clouds.floor import lowest_z_m
 from doorstate.clouds.measured import is_measured
 from doorstate.doorways.column_scorer import ColumnScores, score_columns
@@ -91,16 +92,18 @@ def surveyed_walls(cloud: Points, floor_z_m: float) -> list[tuple[Wall, Elevatio
 
 def thinned(cloud: Points) -> NDArray[np.float32]:
     """Return measured points (N, 3) of some rows and columns of an image, or of some points of a flat cloud."""
-    step = math.ceil(math.sqrt(cloud.size / 3 / _MAX_POINTS)) if cloud.ndim == 3 else 1
-    some = cloud[::step, ::step].reshape(-1, 3) if cloud.ndim == 3 else cloud
-    points = some.take(np.flatnonzero(is_measured(some)), axis=0)
-    return np.asarray(points[:: max(1, len(points) // _MAX_POINTS)], dtype=np.float32)
+    if cloud.ndim == 3:
+        step = math.ceil(math.sqrt(cloud.size / 3 / _MAX_POINTS))
+        cloud = coordinates(cloud[::step, ::step]).T
+    rows = np.flatnonzero(is_measured(cloud))
+    rows = rows[:: max(1, len(rows) // _MAX_POINTS)]
+    return cloud.T.take(rows, axis=1).astype(np.float32, copy=False).T
 
 
 def _survey(points: NDArray[np.float32], floor_m: float) -> list[tuple[Wall, Elevation]]:
     height_m = points[:, 2] - np.float32(floor_m)
     rows = np.flatnonzero((height_m > _UPRIGHT_M[0]) & (height_m < _UPRIGHT_M[1]))
-    upright = points.take(rows, axis=0).astype(np.float64)
+    upright = points.T.take(rows, axis=1).astype(np.float64).T
     lines = SightLines.to(points)
     return [(wall, wall_elevation(wall, lines, floor_m)) for wall in find_walls(upright)]
 

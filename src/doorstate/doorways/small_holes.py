@@ -28,17 +28,19 @@ class Filling(NamedTuple):
 
 
 class _Grid(NamedTuple):
-    """Cells (columns, rows) of the wall's plane, and the points whose sight lines cross them, in their order."""
+    """Cells (columns, rows) of the wall's plane, and the points whose sight lines cross them."""
 
     low_m: NDArray[np.float64]  # (2,) corner
     counts: NDArray[np.int64]
-    rows: Indices  # points by cell
-    starts: Indices  # of each cell in `rows`
+    rows: Indices  # (K,) of the points
+    cells: Indices  # (K,) number of the cell of each
 
     def points_of(self, cells: list[tuple[int, int]]) -> Indices:
-        """Return the points of some cells."""
-        number = [column * self.counts.shape[1] + row for column, row in cells]
-        return np.concatenate([self.rows[self.starts[k] : self.starts[k + 1]] for k in number])
+        """Return the points of some cells, cell by cell in ascending order."""
+        is_wanted = np.zeros(self.counts.shape, dtype=bool)
+        is_wanted[tuple(np.transpose(cells))] = True
+        wanted = np.flatnonzero(is_wanted.ravel()[self.cells])
+        return self.rows[wanted[np.argsort(self.cells[wanted], kind="stable")]]
 
 
 def fill_small_holes(points: Points, camera_m: Points) -> Filling:
@@ -72,10 +74,8 @@ def _grid(points: Points, camera_m: NDArray[np.float64]) -> _Grid | None:
     number, cell = crossed_cells((x, -y, z), 1e-3, float(camera_m[1]), corner_m, columns)
     if len(number) == 0:
         return None
-    order = np.argsort(cell, kind="stable")
-    counts = np.bincount(cell, minlength=columns * NUM_ROWS)
-    starts = np.concatenate([[0], np.cumsum(counts)])
-    return _Grid(np.array([-_HALF_WIDTH_M, 0.0]), counts.reshape(columns, NUM_ROWS), number[order], starts)
+    counts = np.bincount(cell, minlength=columns * NUM_ROWS).reshape(columns, NUM_ROWS)
+    return _Grid(np.array([-_HALF_WIDTH_M, 0.0]), counts, number, cell)
 
 
 def _small_holes(counts: NDArray[np.int64]) -> list[list[tuple[int, int]]]:
@@ -87,20 +87,19 @@ def _small_holes(counts: NDArray[np.int64]) -> list[list[tuple[int, int]]]:
     from scipy.ndimage import label  # few clouds have small holes
 
     numbers, count = label(small)
-    holes = [[(int(c), int(r)) for c, r in np.argwhere(numbers == number)] for number in range(1, count + 1)]
+    holes: list[list[tuple[int, int]]] = [[] for _ in range(count)]
+    for column, row in np.argwhere(small).tolist():
+        holes[numbers[column, row] - 1].append((column, row))
     return sorted(hole for hole in holes if len(hole) >= _MIN_CELLS)
 
 
 def _short_runs(empty: NDArray[np.bool_], most: int) -> NDArray[np.bool_]:
     """Return the cells in runs of at most `most` empty cells along the first axis, with filled cells at both ends."""
-    short = np.zeros_like(empty)
-    for length in range(1, most + 1):
-        starts = len(empty) - length - 1  # places of the filled cell before a run
-        run = ~empty[:starts] & ~empty[length + 1 :]
-        for step in range(1, length + 1):
-            run &= empty[step : starts + step]
-        for step in range(1, length + 1):
-            short[step : starts + step] |= run
+    size = len(empty)
+    place = np.arange(size)[:, None]
+    before = np.maximum.accumulate(np.where(empty, -size, place), axis=0)  # nearest filled cell
+    after = np.minimum.accumulate(np.where(empty, 2 * size, place)[::-1], axis=0)[::-1]
+    short: NDArray[np.bool_] = empty & (after - before - 1 <= most)
     return short
 
 

@@ -13,6 +13,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from doorstate.clouds.coordinates import coordinates
 from doorstate.doorways.plan_lines import Floats, Line, fit_line
 from doorstate.types import Indices
 
@@ -60,7 +61,7 @@ def find_walls(points: Floats) -> list[Wall]:
         points: (N, 3) metres, sensor frame, z up, without floor and ceiling.
     """
     cells_m, heights_m = occupied_cells(points)
-    plan = np.ascontiguousarray(points[:, :2].T)
+    plan = coordinates(points)[:2]
     if len(cells_m) < 2:
         return []
     walls: list[Wall] = []
@@ -102,7 +103,7 @@ def occupied_cells(points: Floats) -> tuple[Floats, Floats]:
     """Return the mean places (K, 2) of cells in plan view with upright things, and their measured heights (K,)."""
     if len(points) == 0:
         return np.empty((0, 2)), np.empty(0)
-    x, y, z = np.ascontiguousarray(points.T)
+    x, y, z = coordinates(points)
     low = np.array([x.min(), y.min()])
     column, row = ((axis - start) / _CELL_M for axis, start in zip((x, y), low, strict=True))
     column, row = column.astype(np.int64), row.astype(np.int64)

@@ -168,12 +168,12 @@ class Gate:
         return next((abstention for check in checks if (abstention := check(view))), None)
 
     def _enough_points(self, view: _View) -> Abstention | None:
-        if len(view.points) >= -(-self.min_points // view.pixels_per_reading):
+        if view.num_points >= -(-self.min_points // view.pixels_per_reading):
             return None
         return Abstention("too_few_points", {"min_points": self.min_points})
 
     def _enough_measured(self, view: _View) -> Abstention | None:
-        share = len(view.points) / view.measured.size
+        share = view.num_points / view.measured.size
         if share >= self.min_measured_share:
             return None
         return Abstention("low_coverage", {"share": share, "min_share": self.min_measured_share})
@@ -245,14 +245,15 @@ class _View:
         return cls(cloud, is_measured(cloud), pixels_per_reading=1)
 
     @cached_property
-    def points(self) -> Points:
-        """(M, 3) measured points."""
-        return self.cloud[self.measured]
+    def num_points(self) -> int:
+        """Number of measured points."""
+        return int(np.count_nonzero(self.measured))
 
     @cached_property
     def sample(self) -> NDArray[np.float64]:
         """(K, 3) measured points, evenly picked, for statistics."""
-        return self.points[:: max(1, len(self.points) // _STATISTICS_POINTS)].astype(np.float64)
+        rows = np.flatnonzero(self.measured)[:: max(1, self.num_points // _STATISTICS_POINTS)]
+        return self.cloud.reshape(-1, 3).take(rows, axis=0).astype(np.float64)
 
 
 def _view_deg(points: NDArray[np.float64]) -> float:
