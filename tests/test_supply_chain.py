@@ -153,6 +153,11 @@ def test_a_release_is_tested_attested_and_published_without_a_password() -> None
         for name, job in jobs.items()
     }
     assert {"actions/attest-build-provenance", "actions/attest"} <= set(used["build"])
+    (materials,) = [step["with"] for step in jobs["build"]["steps"] if "sbom-path" in step.get("with", {})]
+    assert materials["sbom-path"].removeprefix("dist") in (ROOT / "tools/dist.sh").read_text(encoding="utf-8")
+    assert jobs["test"]["uses"] == "./.github/workflows/ci.yml"
+    ci = yaml.safe_load((ROOT / ".github/workflows/ci.yml").read_text(encoding="utf-8"))
+    assert {"run": "make audit", "env": {"PYTHON": "python"}} in ci["jobs"]["audit"]["steps"]
     assert "pypa/gh-action-pypi-publish" in used["publish"]
     assert jobs["publish"]["permissions"] == {"id-token": "write"}
 

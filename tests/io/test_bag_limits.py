@@ -129,6 +129,16 @@ def test_metadata_with_aliases_are_refused(added: str, tmp_path: Path) -> None:
         read(folder)
 
 
+def test_metadata_of_megabytes_are_refused_at_once(tmp_path: Path) -> None:
+    folder = write_bag(tmp_path, "mcap", [cloud("/points", ORGANIZED)])
+    metadata = folder / "metadata.yaml"
+    metadata.write_text(metadata.read_text() + "  x:\n" + "  - a: 1\n" * 250_000)
+    started_s = time.process_time()
+    with pytest.raises(CloudReadError, check=about(metadata)):
+        read(folder)
+    assert time.process_time() - started_s < 1
+
+
 def test_quality_of_service_in_a_database_is_not_parsed(tmp_path: Path) -> None:
     folder = write_bag(tmp_path, "db3", [cloud("/points", ORGANIZED)])
     (store,) = folder.glob("*.db3")

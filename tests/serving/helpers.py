@@ -16,7 +16,7 @@ import httpx
 import numpy as np
 from numpy.typing import NDArray
 
-from doorstate.errors import ConfigError
+from doorstate.errors import ConfigError, WeightsError
 from doorstate.inference.abstention import Abstention
 from doorstate.inference.known import Known
 from doorstate.inference.prediction import Prediction
@@ -63,6 +63,8 @@ class MeanPredictor(Predictor):
             np.ones(2**31, np.float64)
         if order == FAULT:
             raise ZeroDivisionError
+        if order == BROKEN:
+            raise WeightsError("cannot be run", path=Path("door.onnx"))
         if order == INVALID:
             return Prediction.abstain(Abstention("invalid_outputs"), num_points=500)
         points = self.prepare(cloud).points
@@ -75,7 +77,7 @@ class MeanPredictor(Predictor):
         )
 
 
-WAIT, SLEEP, CRASH, TAKE_MEMORY, FAULT, INVALID = 90.0, 91.0, 92.0, 93.0, 94.0, 95.0
+WAIT, SLEEP, CRASH, TAKE_MEMORY, FAULT, INVALID, BROKEN = 90.0, 91.0, 92.0, 93.0, 94.0, 95.0, 96.0
 """Coordinates of a first point, as orders to `MeanPredictor`."""
 
 

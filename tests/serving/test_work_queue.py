@@ -17,6 +17,7 @@ from doorstate.errors import ConfigError
 from doorstate.serving.limits import Limits
 from doorstate.serving.work_queue import WorkQueue
 from tests.serving.helpers import (
+    BROKEN,
     CLOUD,
     CRASH,
     FAULT,
@@ -71,11 +72,12 @@ def test_worker_that_takes_too_long_or_ends_is_replaced() -> None:
 
 
 @pytest.mark.parametrize("points", [500, 5000])
-def test_broken_network_is_unhealthy(points: int) -> None:
+@pytest.mark.parametrize(("number", "status"), [(INVALID, 200), (BROKEN, 500)])
+def test_broken_network_is_unhealthy(points: int, number: float, status: int) -> None:
     with serving(large_bytes=10_000) as client:
-        invalid = order(INVALID, points)
-        response = client.post("/predict?format=npy", content=invalid).raise_for_status().json()
-        assert response["state"] is None
+        response = client.post("/predict?format=npy", content=order(number, points))
+        assert response.status_code == status
+        assert response.json().get("state") is None
         health = client.get("/health")
         assert health.status_code == 503
         assert not health.json()["ready"]

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 from fastapi import HTTPException
 
 from doorstate._jobs import interrupts_blocked
-from doorstate.errors import CloudContentError, DoorstateError
+from doorstate.errors import CloudContentError, DoorstateError, WeightsError
 from doorstate.inference.known import DoorKnown
 from doorstate.inference.network_predictor import NetworkPredictor
 from doorstate.inference.posed import predict_posed
@@ -239,6 +239,10 @@ def predict_file(predictor: Predictor, job: Job, max_bytes: int) -> Reply:
         return Reply(200, record, prediction.reason if is_faulty else "")
     except HTTPException as error:
         return error_reply(error.status_code, error.detail)
+    except WeightsError as error:  # of the service, whatever the file
+        _LOG.error("fault of the weights: %s", error)
+        reason = error.describe(with_path=False)
+        return error_reply(500, reason)._replace(fault=reason)
     except CloudContentError as error:
         return error_reply(422, error.describe(format_parameter, with_path=False))
     except DoorstateError as error:

@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from doorstate.errors import WeightsError, summarize_exception
 from doorstate.inference.abstention import AbstentionCode
 from doorstate.inference.backends.base import Outputs
+from doorstate.inference.backends.onnx_interface import Form, Interface
 from doorstate.inference.backends.threads import default_threads
 from doorstate.networks.card import CARD_KEY, WeightsCard
 from doorstate.networks.card_file import read_card
-from doorstate.networks.heads import POINT_HEADS, head_columns
+from doorstate.networks.heads import HEADS, POINT_HEADS, head_columns
 from doorstate.networks.tensor_file import read_tensors, read_weights_file
 from doorstate.types import PARTS, STATES, Points
 
@@ -36,7 +37,7 @@ REASONS: tuple[AbstentionCode | None, ...] = (
 )
 """Reasons by their number in the output `reason`; the first that holds is given."""
 TENSOR_PREFIX = "weights."  # of names of tensors that a graph takes from a weights file
-_LOG_ERRORS_ONLY = 3
+_LOG_NO_ERRORS = 4  # they are raised too
 # Parts of onnxruntime's messages about files that are newer than itself.
 _NEWER = ("Unsupported model IR version", "is under development and support for this is limited")
 
@@ -68,18 +69,26 @@ class OnnxBackend:
             self.num_points: int | None = self.card.num_points
         else:
             self.card, self.num_points = read_card(weights), None
-        self._heads = head_names(self.card)
-        outputs = {output.name for output in self._session.get_outputs()}
         # Packaged graphs, and files of doorstate 0.1, refuse nothing.
-        self._refuses = REASON in outputs
+        self._refuses = REASON in {output.name for output in self._session.get_outputs()}
+        self._heads = head_names(self.card)
+        self._interface = Interface(path, INPUT, self.num_points, self._outputs())
+        self._interface.check(self._session)
 
     def __call__(self, points: Points) -> Outputs:
         """Run the network on (B, n, 3) metres in farthest-point order, n as in `num_points`."""
-        names = [RAW_PROBABILITIES, *self._heads, REASON] if self._refuses else [PROBABILITIES, *self._heads]
-        probabilities, *others = self._session.run(names, {INPUT: points})
-        values = dict(zip(self._heads, others, strict=False))
+        outputs = self._interface.run(self._session, points)
+        probabilities = outputs[RAW_PROBABILITIES if self._refuses else PROBABILITIES]
+        values = {name: outputs[name] for name in self._heads}
         columns = head_columns(values, self.card.normalization.placement(points))
-        return Outputs(probabilities, columns, self._withheld(others[-1]) if self._refuses else None)
+        return Outputs(probabilities, columns, self._withheld(outputs[REASON]) if self._refuses else None)
+
+    def _outputs(self) -> dict[str, Form]:
+        """Return the outputs to read, with their forms."""
+        probabilities = RAW_PROBABILITIES if self._refuses else PROBABILITIES
+        forms = {probabilities: Form("float32", (len(STATES),))}
+        forms |= {name: Form("float32", (len(HEADS[name].columns),)) for name in self._heads}
+        return forms | ({REASON: Form("int64", ())} if self._refuses else {})
 
     @staticmethod
     def _withheld(reasons: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -104,7 +113,7 @@ def _open_session(path: Path, threads: int, weights: Path | None, spinning: bool
 
     content = read_weights_file(path)
     options = onnxruntime.SessionOptions()
-    options.log_severity_level = _LOG_ERRORS_ONLY
+    options.log_severity_level = _LOG_NO_ERRORS
     options.intra_op_num_threads = threads
     options.add_session_config_entry("session.intra_op.allow_spinning", str(int(spinning)))
     if weights is not None:
