@@ -12,9 +12,11 @@ from typing import Any
 
 import pytest
 
+from doorstate import _locks
 from doorstate._files import is_scratch
 from doorstate.dataset.store import PreparedDataset
 from tests.cli.helpers import Run, check_error
+from tests.test__locks import hold
 
 _COMMAND = [sys.executable, "-c", "from doorstate.cli import main; main()"]
 
@@ -57,3 +59,26 @@ def test_a_folder_has_one_owner(
     assert errors.splitlines()[-1].startswith("doorstate: terminated")
     assert "Traceback" not in errors
     assert [path for path in out.rglob("*") if is_scratch(path)] == []
+
+
+@pytest.mark.parametrize("command", ["evaluate", "report"])
+def test_results_of_two_commands_are_not_mixed(
+    command: str,
+    run: Run,
+    small_dataset: PreparedDataset,
+    simulated_folder: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(_locks, "_WAIT_S", 0.2)
+    source = {
+        "evaluate": [simulated_folder / "pcd", "--rule", "plane_state"],
+        "report": [small_dataset.folder],
+    }
+    first = hold(tmp_path / "out")
+    try:
+        check_error(run(command, *source[command], "--out", tmp_path / "out"), 1, f"process {first.pid} on ")
+    finally:
+        first.kill()
+        first.communicate()
+    assert [path for path in (tmp_path / "out").iterdir() if not is_scratch(path)] == []

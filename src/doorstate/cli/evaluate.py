@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -80,6 +81,7 @@ def evaluate(
       doorstate evaluate DeepDoors2 --layout deepdoors2 --weights mine.safetensors --by split --json
     """
     from doorstate._files import check_writable
+    from doorstate._locks import owned_folder
     from doorstate.cli.console import print_json, stderr
     from doorstate.cli.evaluate_output import PAGE, print_scores, write_frame_report
     from doorstate.cli.prediction_summary import print_errors
@@ -97,27 +99,29 @@ def evaluate(
         group = _DOOR_COLUMN
     for column in (*(by or ()), *([group] if group else ())):
         check_column(frames, column.partition(":")[0])
-    if out is not None:
-        check_writable(out / PAGE)
-    predictors = load_predictors(
-        Methods(network, weights, rule), points, budget_ms=budget_ms, threads=threads
-    )
-    with progress_bar("Predicting") as progress:
-        results = evaluate_frames(predictors, frames, progress)
-    print_errors([(frame.file, reason) for frame, reason in results.unreadable], "file")
-    if not results.frames:
-        raise CloudReadError(f"none of {len(frames)} files could be read", path=folder)
-    scores = results.score(group, by or ())
-    tables, notes = frame_tables(scores, group or NO_GROUP), frame_notes(scores, group or NO_GROUP)
-    if as_json:
-        print_json(scores.to_json())
-    else:
-        print_scores(tables, notes)
-    if out is not None:
-        page = write_frame_report(out, folder, predictors, results, scores, tables, notes, all_frames)
-        stderr.print(f"page: {page}")
-    if results.unreadable:
-        stderr.print(
-            f"{len(results.unreadable)} of {len(frames)} files could not be read and are not counted"
+    with ExitStack() as stack:
+        if out is not None:
+            check_writable(out / PAGE)
+            stack.enter_context(owned_folder(out))
+        predictors = load_predictors(
+            Methods(network, weights, rule), points, budget_ms=budget_ms, threads=threads
         )
-        raise typer.Exit(1)
+        with progress_bar("Predicting") as progress:
+            results = evaluate_frames(predictors, frames, progress)
+        print_errors([(frame.file, reason) for frame, reason in results.unreadable], "file")
+        if not results.frames:
+            raise CloudReadError(f"none of {len(frames)} files could be read", path=folder)
+        scores = results.score(group, by or ())
+        tables, notes = frame_tables(scores, group or NO_GROUP), frame_notes(scores, group or NO_GROUP)
+        if as_json:
+            print_json(scores.to_json())
+        else:
+            print_scores(tables, notes)
+        if out is not None:
+            page = write_frame_report(out, folder, predictors, results, scores, tables, notes, all_frames)
+            stderr.print(f"page: {page}")
+        if results.unreadable:
+            stderr.print(
+                f"{len(results.unreadable)} of {len(frames)} files could not be read and are not counted"
+            )
+            raise typer.Exit(1)

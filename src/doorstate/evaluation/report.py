@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from doorstate._files import write_text
+from doorstate._locks import owned_folder
 from doorstate.dataset.store import PreparedDataset, open_dataset
 from doorstate.evaluation.caveats import PROTOCOLS, caveats
 from doorstate.evaluation.figures.draw import draw_dataset_figures, draw_figures
@@ -50,6 +51,7 @@ def write_report(
     Raises:
         RunError: the comparison cannot be used.
         DatasetError: the data set or the splits cannot be used.
+        FolderInUseError: another process writes to `out`.
     """
     results = join_results([load_results(folder, dataset, folds) for folder in folders])
     return write_results_report(results, out)
@@ -57,12 +59,13 @@ def write_report(
 
 def write_results_report(results: Results, out: Path) -> Path:
     """Write the report of loaded results as `write_report` does."""
-    prepared = open_dataset(results.dataset_folder)
-    tables, figures = build_tables(results), draw_figures(results, prepared)
-    save_tables(tables, out / "tables")
-    save_figures(figures, out / "figures")
-    page = out / "report.html"
-    write_text(page, render_report(results, prepared, tables, figures))
+    with owned_folder(out):
+        prepared = open_dataset(results.dataset_folder)
+        tables, figures = build_tables(results), draw_figures(results, prepared)
+        save_tables(tables, out / "tables")
+        save_figures(figures, out / "figures")
+        page = out / "report.html"
+        write_text(page, render_report(results, prepared, tables, figures))
     return page
 
 
@@ -78,10 +81,12 @@ def write_dataset_report(dataset: Path, out: Path) -> Path:
 
     Raises:
         DatasetError: the data set cannot be used.
+        FolderInUseError: another process writes to `out`.
     """
     prepared = open_dataset(dataset)
-    save_tables(dataset_tables(manifest_frame(prepared.rows)), out / "tables")
-    save_figures(draw_dataset_figures(prepared), out / "figures")
+    with owned_folder(out):
+        save_tables(dataset_tables(manifest_frame(prepared.rows)), out / "tables")
+        save_figures(draw_dataset_figures(prepared), out / "figures")
     return out
 
 
