@@ -3,16 +3,17 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from doorstate.clouds.preparation import CloudSpec
-from doorstate.dataset.pieces import write_concatenated
+from doorstate.dataset.pieces import SavedPieces, write_concatenated
 from doorstate.dataset.preparation import Preparation
 from doorstate.dataset.prepare import prepare_dataset
-from doorstate.errors import OutputError
+from doorstate.errors import DatasetError, OutputError
 from tests.full_disk import full_disk
 
 
@@ -24,6 +25,23 @@ def test_the_file_is_that_of_numpy(shape: tuple[int, ...], dtype: type[np.generi
     write_concatenated(tmp_path / "a.npy", [array[:3], array[3:3], array[3:]], shape, dtype)
     np.save(tmp_path / "b.npy", array)
     assert (tmp_path / "a.npy").read_bytes() == (tmp_path / "b.npy").read_bytes()
+
+
+@pytest.mark.parametrize("kind", ["pipe", "text", "other arrays", "no JSON"])
+def test_damaged_pieces_are_refused(kind: str, tmp_path: Path) -> None:
+    path = tmp_path / "00000.npz"
+    match kind:
+        case "pipe":
+            os.mkfifo(path)
+        case "text":
+            path.write_bytes(b"PK\x03\x04 no archive")
+        case "other arrays":
+            np.savez(path, clouds=np.zeros(3))
+        case "no JSON":
+            np.savez(path, samples=np.array("[["))
+    with pytest.raises(DatasetError) as caught:
+        SavedPieces.read([path])
+    assert caught.value.path == path
 
 
 def test_a_full_disk_is_an_error_in_one_line(simulated_folder: Path, tmp_path: Path) -> None:

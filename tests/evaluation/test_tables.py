@@ -3,13 +3,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
 
 from doorstate.dataset.store import PreparedDataset
 from doorstate.evaluation.predictions import load_results
-from doorstate.evaluation.run_tables import runs_table
+from doorstate.evaluation.run_tables import misclassified_table, runs_table
 from doorstate.evaluation.score_tables import folds_table
 from doorstate.evaluation.table import UNDEFINED
 from doorstate.evaluation.tables import build_tables, save_tables
@@ -32,6 +33,20 @@ def test_every_table_is_written_the_same_twice(
         assert len(pd.read_csv(path)) == len(table.rows), name
     summary = pd.read_csv(tmp_path / "one" / "summary.csv")
     assert summary["errors"].tolist() == [0, 1]
+
+
+def test_names_of_samples_are_no_formulas(
+    simulated: PreparedDataset, make_comparison: MakeComparison, tmp_path: Path
+) -> None:
+    name = simulated.rows[5]["sample_id"]
+    results = load_results(make_comparison(simulated, {"dgcnn": {name: "closed"}}))
+    changed = replace(
+        results,
+        predictions=results.predictions.replace({"sample_id": {name: "=1+1"}}),
+        manifest=results.manifest.rename(index={name: "=1+1"}),
+    )
+    save_tables({"misclassified": misclassified_table(changed)}, tmp_path)
+    assert pd.read_csv(tmp_path / "misclassified.csv")["sample_id"].tolist() == ["./=1+1"]
 
 
 def test_folds_table_leaves_gaps(simulated: PreparedDataset, make_comparison: MakeComparison) -> None:

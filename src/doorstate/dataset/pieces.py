@@ -4,7 +4,10 @@
 from __future__ import annotations
 
 import json
+import zipfile
+import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple, Self
@@ -13,6 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from doorstate._files import atomic_path
+from doorstate._input import open_input
+from doorstate.errors import DatasetError, summarize_exception
 from doorstate.types import Points
 
 
@@ -59,10 +64,14 @@ class SavedPieces(NamedTuple):
 
     @classmethod
     def read(cls, paths: Sequence[Path]) -> Self:
-        """Read the columns and reasons of all pieces."""
+        """Read the columns and reasons of all pieces.
+
+        Raises:
+            DatasetError: one is damaged.
+        """
         samples: list[list[tuple[dict[str, str], str]]] = []
         for path in paths:
-            with np.load(path, allow_pickle=False) as piece:
+            with _open_piece(path) as piece:
                 samples += json.loads(str(piece["samples"]))
         return cls(paths, samples)
 
@@ -104,8 +113,19 @@ class SavedPieces(NamedTuple):
 
     def _arrays(self, name: str) -> Iterator[NDArray[Any]]:
         for path in self.paths:
-            with np.load(path, allow_pickle=False) as piece:
+            with _open_piece(path) as piece:
                 yield piece[name]
+
+
+@contextmanager
+def _open_piece(path: Path) -> Iterator[Any]:
+    try:
+        with open_input(path, None, DatasetError) as stream, np.load(stream, allow_pickle=False) as piece:
+            yield piece
+    except (ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+        raise DatasetError(
+            f"damaged ({summarize_exception(error)})", path=path, hint="delete it and prepare again"
+        ) from error
 
 
 def write_concatenated(

@@ -12,6 +12,7 @@ import numpy as np
 
 from doorstate._documents import read_json
 from doorstate._files import read_csv, write_csv, write_text
+from doorstate._input import MAX_SETTINGS_BYTES, read_input_text
 from doorstate.errors import RunError
 from doorstate.types import STATES
 
@@ -61,8 +62,8 @@ class RunFolder:
     def read_position(self) -> float:
         """Return the position of the training, in epochs; 0 before it is written."""
         try:
-            return float(self.position.read_text(encoding="utf-8"))
-        except (OSError, ValueError):
+            return float(read_input_text(self.position, MAX_SETTINGS_BYTES, RunError))
+        except (RunError, ValueError):
             return 0.0
 
     def read_metrics(self) -> dict[str, Any]:
