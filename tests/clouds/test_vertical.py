@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from doorstate.clouds.up_directions import face_one_way, up_directions
+from doorstate.clouds.up_directions import _axes, face_one_way, up_directions
 from doorstate.clouds.vertical import LevelingRefusal, Vertical, find_vertical
 from doorstate.clouds.view_planes import ViewPlane
 
@@ -81,3 +81,16 @@ def test_known_height_is_evidence() -> None:
     other = find_vertical(planes, SAMPLE, camera_height_m=2.0)
     assert isinstance(other, Vertical)
     assert other.up[2] == pytest.approx(1)
+
+
+def test_axes_equal_those_of_a_loop_over_pairs() -> None:
+    for count in (1, 2, 10):
+        normals = np.random.default_rng(count).normal(size=(count, 3))
+        normals /= np.linalg.norm(normals, axis=1)[:, None]
+        plain = list(normals)
+        for number in range(count):
+            for other in range(number):
+                line = np.cross(normals[number], normals[other])
+                length = np.linalg.norm(line)
+                plain += [line / length] if length > math.sin(math.radians(20)) else []
+        assert (_axes(normals) == np.array(plain)).all()

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from doorstate.doorways.doorway import Doorway
-from doorstate.doorways.evidence import find_evidence
+from doorstate.doorways.evidence import _pooled, _row_density, find_evidence
 from doorstate.doorways.finder import thinned
-from doorstate.doorways.leaf_sweep import SEMI_OPEN_ANGLES_DEG, sweep_leaf
+from doorstate.doorways.leaf_sweep import SEMI_OPEN_ANGLES_DEG, _counts, _widened, sweep_leaf
 from doorstate.doorways.measured_view import MeasuredView
 from tests.doorways import scenes
 from tests.doorways.scenes import HandMade
@@ -117,3 +117,37 @@ def test_a_wall_that_goes_on_is_no_leaf() -> None:
     doorway = Doorway(2.5, -0.4, 90.0, 0.9, -1.0)
     assert sweep_leaf(MeasuredView(_leaf(90.0, doorway, beyond_m=1.0)), doorway) is None
     assert sweep_leaf(MeasuredView(_leaf(90.0, doorway, top_m=2.5)), doorway) is None
+
+
+@pytest.mark.parametrize("pool", [1, 2, 3])
+def test_pooled_cells_equal_sums_of_padded_blocks(pool: int) -> None:
+    for shape in ((1, 1), (7, 5), (9, 6), (8, 19)):
+        cells = np.random.default_rng(0).integers(0, 9, shape).astype(np.float64)
+        columns, rows = (-(-size // pool) for size in shape)
+        padded = np.pad(cells, ((0, columns * pool - shape[0]), (0, rows * pool - shape[1])))
+        plain = padded.reshape(columns, pool, rows, pool).sum(axis=(1, 3))
+        assert (_pooled(cells, pool) == plain).all()
+        assert (_pooled(np.stack([cells, 2 * cells]), pool) == np.stack([plain, 2 * plain])).all()
+
+
+def test_density_of_rows_equals_a_loop() -> None:
+    rim = np.random.default_rng(0).poisson(0.4, (11, 19)).astype(np.float64)
+    density = _row_density(rim)
+    for row in range(19):
+        rows = [max(0, row - 1), row, min(18, row + 1)]
+        about = [sum(column[rows]) / 3 for column in rim]
+        filled = [value for value in about if value > 0]
+        assert density[row] == pytest.approx(sum(filled) / len(filled) if len(filled) >= 2 else 0)
+
+
+def test_cells_of_a_leaf_are_counted_by_part() -> None:
+    rng = np.random.default_rng(0)
+    cells, parts = rng.random((2, 2, 7, 10, 8)) < 0.5, rng.random((3, 10, 8)) < 0.4
+    plain = [(cells & part).sum(axis=(-2, -1)) for part in parts]
+    assert (_counts(cells, parts) == np.stack(plain)).all()
+
+
+def test_walls_take_the_angles_beside_them() -> None:
+    is_wall = np.random.default_rng(0).random((2, 2, 24)) < 0.1
+    windows = np.lib.stride_tricks.sliding_window_view(np.pad(is_wall, ((0, 0), (0, 0), (2, 2))), 5, axis=-1)
+    assert (_widened(is_wall) == windows.any(axis=-1)).all()

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -41,7 +41,7 @@ class UpDirection(NamedTuple):
 def up_directions(planes: Sequence[ViewPlane]) -> list[UpDirection]:
     """Return the axes within the largest pitch, those that most of the planes agree with first."""
     fit = _Fit(planes)
-    axes = np.array(list(_axes(fit.normals)))
+    axes = _axes(fit.normals)
     axes = axes[_in_reach(axes)]
     if len(axes) == 0:
         return []
@@ -92,14 +92,13 @@ class _Fit:
         return scatter
 
 
-def _axes(normals: Floats) -> Iterator[Floats]:
-    yield from normals
-    for number, normal in enumerate(normals):
-        for other in normals[:number]:
-            line = np.cross(normal, other)
-            length = float(np.linalg.norm(line))
-            if length > _MIN_MEETING:
-                yield line / length
+def _axes(normals: Floats) -> Floats:
+    """Return the normals of planes, and the lines in which two of them meet."""
+    first, second = np.tril_indices(len(normals), -1)
+    lines = np.cross(normals[first], normals[second])
+    lengths = np.sqrt([line @ line for line in lines])
+    meet = np.flatnonzero(lengths > _MIN_MEETING)
+    return np.concatenate([normals, lines[meet] / lengths[meet, None]])
 
 
 def _in_reach(axes: Floats) -> NDArray[np.bool_]:

@@ -33,6 +33,7 @@ _TOLERANCE = 2.5  # deviations of inverse depth
 _NOISE_QUANTILE = 0.4  # least share of the cells that hold a single plane
 _NOISE_LIMITS = 0.0007, 0.012  # 1 / m; of a perfect and of a poor camera
 _RIDGE = 1e-7
+_UNIT = np.eye(3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,9 +179,15 @@ def _misfits(cells: _Cells, planes: Floats) -> Floats:
 
 def _regress(uu: Floats, uq: Floats) -> Floats:
     """Return the regression (..., 3) of inverse depth on ray slopes."""
-    ridge = _RIDGE * np.trace(uu, axis1=-2, axis2=-1)[..., None, None] * np.eye(3)
-    plane: Floats = np.linalg.solve(uu + ridge, uq[..., None])[..., 0]
+    plane = np.asarray(np.linalg.solve(_with_ridge(uu), uq[..., None])[..., 0], np.float64)
     return plane
+
+
+def _with_ridge(uu: Floats) -> Floats:
+    """Return sums of squares (..., 3, 3) that are never singular."""
+    trace = uu[..., 0, 0] + uu[..., 1, 1] + uu[..., 2, 2]
+    with_ridge: Floats = uu + (_RIDGE * trace)[..., None, None] * _UNIT
+    return with_ridge
 
 
 def _plane(cells: _Cells, members: NDArray[np.bool_], noise: float) -> ViewPlane:
@@ -188,6 +195,6 @@ def _plane(cells: _Cells, members: NDArray[np.bool_], noise: float) -> ViewPlane
     plane = _regress(uu, uq)
     length = float(np.linalg.norm(plane))
     normal = plane / length
-    across = (np.eye(3) - np.outer(normal, normal)) * (noise / length)
-    variance = float(np.trace(across @ np.linalg.inv(uu + _RIDGE * np.trace(uu) * np.eye(3)) @ across))
+    across = (_UNIT - normal[:, None] * normal) * (noise / length)
+    variance = float((across @ np.linalg.inv(_with_ridge(uu)) @ across).trace())
     return ViewPlane(normal, 1 / length, float(members.mean()), math.degrees(math.sqrt(variance)))

@@ -209,17 +209,17 @@ def _shares(
     if in_view.sum() == 0:
         return (0.0, 0.0, 0.0, 0.0), is_missing
     seen = kinds.sum(axis=0)
+    beside = [seen[rim][:, in_view.any(axis=0)] for rim in rims]
     for pool in _POOLS:
-        lines, cells = _pooled(expected * in_view, pool), _pooled(in_view, pool)
-        counted = (cells >= 0.5 * pool**2) & (lines >= _MIN_EXPECTED)
-        is_enough = counted.any() and counted.sum() >= 0.5 * (cells >= 0.5 * pool**2).sum()
-        if is_enough and all(
-            _filled_share(seen[rim][:, in_view.any(axis=0)], pool) >= _MIN_FILLED for rim in rims
-        ):
+        lines, cells = _pooled(np.stack([expected * in_view, in_view]), pool)
+        is_in_view = cells >= 0.5 * pool**2
+        counted = is_in_view & (lines >= _MIN_EXPECTED)
+        is_enough = counted.any() and np.count_nonzero(counted) >= 0.5 * np.count_nonzero(is_in_view)
+        if is_enough and all(_filled_share(rim, pool) >= _MIN_FILLED for rim in beside):
             break
     else:
         counted = cells > 0  # too few points to tell a hole from chance in each cell
-    pooled = np.stack([_pooled(kind * in_view, pool) for kind in kinds])
+    pooled = _pooled(kinds * in_view, pool)
     totals = pooled.sum(axis=0)
     empty = counted & (totals == 0)
     filled = counted & (totals > 0)
@@ -252,15 +252,14 @@ def _scatter_m(relief_m: Cells) -> float:
 
 
 def _pooled(cells: Cells, pool: int) -> Cells:
-    """Return the sums of blocks of cells."""
+    """Return the sums of blocks of cells (..., columns, rows)."""
     if pool == 1:
         return cells
-    columns, rows = (-(-size // pool) for size in cells.shape)
-    padded = np.zeros((columns * pool, rows * pool))
-    padded[: cells.shape[0], : cells.shape[1]] = cells
-    sums = np.zeros((columns, rows))
+    columns, rows = (-(-size // pool) for size in cells.shape[-2:])
+    sums = np.zeros((*cells.shape[:-2], columns, rows))
     for i, j in product(range(pool), repeat=2):
-        sums += padded[i::pool, j::pool]
+        part = cells[..., i::pool, j::pool]
+        sums[..., : part.shape[-2], : part.shape[-1]] += part
     return sums
 
 

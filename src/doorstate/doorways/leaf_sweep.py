@@ -89,17 +89,13 @@ def _best_leaf(
     beside = (np.abs(x) > doorway.width_m / 2) & (y > _WALL_M[0]) & (y < _WALL_M[1])
     in_view &= ~beside[..., None]
     filled = _look_up(occupied, x, y) & in_view
-
-    def share(part: NDArray[np.bool_]) -> NDArray[np.float64]:
-        total = (in_view & part).sum(axis=(-2, -1))
-        shares: NDArray[np.float64] = (filled & part).sum(axis=(-2, -1)) / np.maximum(total, 1)
-        return shares
-
     is_outer = is_leaf & (np.arange(len(along)) >= _STEPS - _OUTER)[:, None]
-    is_enough = (in_view & is_leaf).sum(axis=(-2, -1)) >= _MIN_CELLS
-    is_enough &= (in_view & is_outer).sum(axis=(-2, -1)) >= _MIN_OUTER_CELLS
-    shares = np.where(is_enough, np.minimum(share(is_leaf), share(is_outer)), 0.0)
-    goes_on = (share(is_beyond) > 0.5) | (share(is_above) > 0.5)
+    parts = np.stack([is_leaf, is_outer, is_beyond, is_above])
+    leaf, outer, *_ = totals = _counts(in_view, parts)
+    shares_of = _counts(filled, parts) / np.maximum(totals, 1)
+    is_enough = (leaf >= _MIN_CELLS) & (outer >= _MIN_OUTER_CELLS)
+    shares = np.where(is_enough, np.minimum(shares_of[0], shares_of[1]), 0.0)
+    goes_on = (shares_of[2] > 0.5) | (shares_of[3] > 0.5)
     shares[_widened(goes_on)] = 0.0
     hinge, swing, number = (int(index) for index in np.unravel_index(int(shares.argmax()), shares.shape))
     if shares[hinge, swing, number] == 0:
@@ -115,10 +111,17 @@ def _best_leaf(
 
 def _widened(is_wall: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Return the walls (..., angle) and the angles beside them, at which a leaf would still lie on the wall."""
-    padded = np.pad(is_wall, ((0, 0), (0, 0), (_BESIDE, _BESIDE)))
-    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * _BESIDE + 1, axis=-1)
-    widened: NDArray[np.bool_] = np.any(windows, axis=-1)
+    widened = is_wall.copy()
+    for step in range(1, _BESIDE + 1):
+        widened[..., step:] |= is_wall[..., :-step]
+        widened[..., :-step] |= is_wall[..., step:]
     return widened
+
+
+def _counts(cells: NDArray[np.bool_], parts: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Return the number (part, ...) of the cells (..., step, level) that belong to each part (part, step, level)."""
+    flat = cells.reshape(*cells.shape[:-2], -1).astype(np.float64)
+    return np.moveaxis(flat @ parts.reshape(len(parts), -1).T.astype(np.float64), -1, 0)
 
 
 def _half_m(doorway: Doorway) -> tuple[float, float]:

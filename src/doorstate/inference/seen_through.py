@@ -8,11 +8,12 @@ returns nothing, so that most rays to that floor are missing, even where a pane 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from doorstate.clouds.coordinates import coordinates
 from doorstate.clouds.floor import lowest_z_m
 from doorstate.inference.view_cells import NEIGHBOUR, nearest_measured
 from doorstate.types import Points
@@ -93,14 +94,14 @@ def floor_rays(
         opening: opening in a wall.
         reach_m: horizontal range up to which floor must be measured.
     """
-    points = cloud[measured]
-    ahead = points[:, 0] > 0
-    some = points[ahead][:: max(1, len(points) // _MAX_POINTS)]
-    if len(some) <= NEIGHBOUR:
+    xyz = coordinates(cloud).take(np.flatnonzero(measured), axis=1)
+    ahead = xyz[0] > 0
+    some = xyz.take(np.flatnonzero(ahead)[:: max(1, xyz.shape[1] // _MAX_POINTS)], axis=1)
+    if some.shape[1] <= NEIGHBOUR:
         return None
-    spots = _floor_spots(opening, lowest_z_m(some), reach_m)
+    spots = _floor_spots(opening, lowest_z_m(some.T), reach_m)
     rays = spots[..., 1:] / np.maximum(spots[..., :1], 1e-3)
-    low, high = np.quantile(some[:, 1:] / some[:, :1], (0.005, 0.995), axis=0)
+    low, high = np.quantile(some[1:] / some[0], (0.005, 0.995), axis=1)
     in_view = (spots[..., 0] > 0) & ((rays >= low) & (rays <= high)).all(axis=-1)
     in_view &= np.cumsum(in_view, axis=1) <= _DEPTH_SPOTS
     rays = rays[in_view]
@@ -111,10 +112,10 @@ def floor_rays(
     for axis, (first, last) in enumerate(
         zip(rays.min(axis=0) - margin, rays.max(axis=0) + margin, strict=True)
     ):
-        near &= points[:, axis + 1] >= np.float32(first) * points[:, 0]
-        near &= points[:, axis + 1] <= np.float32(last) * points[:, 0]
-    points = points[near]
-    points = points[:: max(1, len(points) // _MAX_POINTS)].astype(np.float64)
+        near &= xyz[axis + 1] >= np.float32(first) * xyz[0]
+        near &= xyz[axis + 1] <= np.float32(last) * xyz[0]
+    rows = np.flatnonzero(near)
+    points = xyz.T[rows[:: max(1, len(rows) // _MAX_POINTS)]].astype(np.float64)
     if len(points) <= NEIGHBOUR:
         return FloorRays(0.0, 0.0)
     tangents = points[:, 1:] / points[:, :1]
@@ -157,7 +158,7 @@ def _axes(opening: Opening) -> tuple[NDArray[np.float64], NDArray[np.float64], N
     return middle, along, normal * (1.0 if normal @ middle >= 0 else -1.0)
 
 
-def _behind_m(opening: Opening, points: Points) -> NDArray[np.float64]:
+def _behind_m(opening: Opening, points: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
     middle, _, normal = _axes(opening)
     behind_m: NDArray[np.float64] = (points[:, :2] - middle) @ normal
     return behind_m

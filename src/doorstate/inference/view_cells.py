@@ -131,7 +131,7 @@ def nearest_measured(
     """
     from scipy.spatial import cKDTree  # takes longer to import than an image of points to predict
 
-    tree = cKDTree(places)
+    tree = cKDTree(places, balanced_tree=False, compact_nodes=False)  # built in half the time
     gap, nearest = tree.query(queries)
     spacing = np.asarray(tree.query(places[nearest], [NEIGHBOUR + 1])[0])[..., 0]
     return gap <= max_gap * spacing, np.asarray(nearest)
