@@ -21,6 +21,7 @@ from .doorways import NEAR_M, SEED, VISIBLE_PX, View, gap_to, nearest, simulated
 from .words import count_words
 
 _EXACT_M = 0.1
+_LEAF_PX = 150  # of a leaf in view
 
 
 class FoundDoor(NamedTuple):
@@ -30,6 +31,7 @@ class FoundDoor(NamedTuple):
         preset: kind of rooms.
         sensor: name of the sensor model.
         state: true state.
+        shows_leaf: at least 150 pixels see the leaf, without which an opening alone must tell the state.
         position_error_m: distance of the answer; None if there is none within 0.35 m.
         predicted: state of the answer.
         reason: code of the reason why there is no answer, or none with a state.
@@ -38,6 +40,7 @@ class FoundDoor(NamedTuple):
     preset: str
     sensor: str
     state: str
+    shows_leaf: bool
     position_error_m: float | None
     predicted: str | None
     reason: str
@@ -90,7 +93,7 @@ def measure_doors(
 
 def found_door(view: View, door: TrueDoor, prediction: Prediction) -> FoundDoor:
     """Return what a prediction says of a door."""
-    start = (view.preset, view.sensor, str(door.state))
+    start = (view.preset, view.sensor, str(door.state), door.visible_px.leaf >= _LEAF_PX)
     answer = nearest(door, prediction.doors)
     if answer is None:
         refused = nearest(door, prediction.refused)
@@ -119,6 +122,7 @@ def doors_table(doors: Sequence[FoundDoor], frames: Sequence[AnsweredFrame]) -> 
         error_m = of_doors["position_error_m"].dropna()
         found = of_doors.loc[error_m.index]
         with_state = found[found["predicted"].notna()]
+        is_right = with_state["predicted"] == with_state["state"]
         lines.append(
             {
                 "preset": preset,
@@ -127,7 +131,8 @@ def doors_table(doors: Sequence[FoundDoor], frames: Sequence[AnsweredFrame]) -> 
                 "found": of_doors["position_error_m"].notna().mean(),
                 "exact": (error_m <= _EXACT_M).mean(),
                 "median": error_m.median() * 100,
-                "right": (with_state["predicted"] == with_state["state"]).mean(),
+                "right": is_right.mean(),
+                "right_leaf": is_right[with_state["shows_leaf"].astype(bool)].mean(),
                 "silent": found["predicted"].isna().mean(),
                 "frames": len(answered),
                 "false": answered["false_doors"].mean(),
@@ -146,12 +151,14 @@ def doors_table(doors: Sequence[FoundDoor], frames: Sequence[AnsweredFrame]) -> 
             number_column("median", "median error, cm", 1),
             number_column("silent", "without a state", 3),
             number_column("right", "state right, of those with one", 3),
+            number_column("right_leaf", "with a leaf in view", 3),
             count_column("frames"),
             number_column("false", "false doors a frame", 2),
             number_column("false_states", "with a state", 2),
         ],
         note=f"Doors with at least {VISIBLE_PX} visible pixels of leaf, frame or opening, in clouds given as level. A "
-        "false door is not the nearest answer to any door, however little of that is visible.",
+        "false door is not the nearest answer to any door, however little of that is visible. A leaf is in view if "
+        f"at least {_LEAF_PX} pixels see it.",
     )
 
 
@@ -178,7 +185,10 @@ def reasons_table(doors: Sequence[FoundDoor]) -> Table:
         text_column("silent", "without a state"),
         text_column("wrong", "wrong states"),
     ]
-    note = "*No candidate*: the search proposes nothing within 0.35 m. Other words are codes of reasons."
+    note = (
+        f"*No candidate*: the search proposes nothing within {NEAR_M:g} m, or something likelier that overlaps. Other "
+        "words are codes of reasons."
+    )
     return Table.from_frame("Reasons", pd.DataFrame(lines), columns, note)
 
 

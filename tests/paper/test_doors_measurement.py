@@ -87,14 +87,14 @@ def test_doors_that_are_not_found_have_a_reason(view: View) -> None:
 
 def test_every_preset_has_a_row() -> None:
     doors = [
-        FoundDoor("corridor", "xtion", "open", 0.05, "open", ""),
-        FoundDoor("corridor", "xtion", "open", 0.2, "closed", ""),
-        FoundDoor("corridor", "xtion", "closed", 0.05, None, "unsure"),
-        FoundDoor("corridor", "xtion", "closed", None, None, "no_door"),
+        FoundDoor("corridor", "xtion", "open", True, 0.05, "open", ""),
+        FoundDoor("corridor", "xtion", "open", False, 0.2, "closed", ""),
+        FoundDoor("corridor", "xtion", "closed", True, 0.05, None, "unsure"),
+        FoundDoor("corridor", "xtion", "closed", True, None, None, "no_door"),
     ]
     frames = [AnsweredFrame("corridor", "xtion", 3, 1, 1), AnsweredFrame("no-door", "xtion", 0, 0, 0)]
     rows = doors_table(doors, frames).rows
-    assert rows[0][2:] == ("4", "0.750", "0.667", "5.0", "0.333", "0.500", "1", "1.00", "1.00")
+    assert rows[0][2:] == ("4", "0.750", "0.667", "5.0", "0.333", "0.500", "1.000", "1", "1.00", "1.00")
     assert rows[1][:4] == ("no-door", "xtion", "0", "–")
     assert reasons_table(doors).rows == (("corridor", "no_door 1", "unsure 1", "open as closed 1"),)
 
