@@ -11,9 +11,11 @@ Inputs that reach new code are kept in a folder, from which the next run continu
 from __future__ import annotations
 
 import argparse
+import multiprocessing
+import os
 import re
-import subprocess
 import sys
+import tempfile
 import time
 import warnings
 from collections.abc import Callable
@@ -56,18 +58,23 @@ def main() -> None:
     fuzz(arguments)
 
 
+def import_instrumented() -> dict[str, Callable[[], None]]:
+    """Return all targets by name; what they import counts for coverage."""
+    with atheris.instrument_imports(include=_INSTRUMENTED):
+        from tests.fuzz.targets import TARGETS
+    return TARGETS
+
+
 def fuzz(arguments: argparse.Namespace) -> None:
     """Fuzz one target in this process, which libFuzzer ends."""
-    with atheris.instrument_imports(include=_INSTRUMENTED):
-        from tests.fuzz import settings_files
-        from tests.fuzz.targets import TARGETS
+    targets, name = import_instrumented(), arguments.target
+    from tests.fuzz import settings_files
 
-    name = arguments.target
-    if name not in TARGETS:
-        sys.exit(f"no target {name!r}; targets are {', '.join(TARGETS)}, all")
+    if name not in targets:
+        sys.exit(f"no target {name!r}; targets are {', '.join(targets)}, all")
     corpus = arguments.corpus / name
     corpus.mkdir(parents=True, exist_ok=True)
-    run: Callable[[bytes], None] = TARGETS[name].hypothesis.fuzz_one_input  # type: ignore[attr-defined]
+    run: Callable[[bytes], None] = targets[name].hypothesis.fuzz_one_input  # type: ignore[attr-defined]
     if name in settings_files.targets() and not arguments.damage:
         run = partial(settings_files.read_content, name=name)
         corpus = corpus / "content"
@@ -90,29 +97,31 @@ def fuzz(arguments: argparse.Namespace) -> None:
 
 def fuzz_all(arguments: argparse.Namespace) -> None:
     """Fuzz all targets one after another, and print a line of a table for each."""
-    from tests.fuzz.targets import TARGETS
-
+    # Imported once: to instrument all modules takes longer than a short round of a target.
+    targets = import_instrumented()
     print("| target | inputs | s | failed |\n|---|--:|--:|---|", flush=True)
-    for name in TARGETS:
-        options = [
-            f"--runs={arguments.runs}",
-            f"--seconds={arguments.seconds}",
-            f"--corpus={arguments.corpus}",
-        ]
+    for name in targets:
         started = time.monotonic()
-        finished = subprocess.run(
-            [sys.executable, "-m", "tests.fuzz", name, *options, *["--damage"][: arguments.damage]],
-            stderr=subprocess.STDOUT,
-            stdout=subprocess.PIPE,
-            text=True,
-            errors="replace",
-        )
-        inputs = [
-            int(number) for number in re.findall(r"^(?:#|Done )([0-9]+)", finished.stdout, re.MULTILINE)
-        ]
-        failed = finished.stdout.strip().rpartition("\n")[2] if finished.returncode else "none"
+        with tempfile.TemporaryFile() as output:
+            process = multiprocessing.get_context("fork").Process(
+                target=_fuzz_into, args=(arguments, name, output.fileno())
+            )
+            process.start()
+            process.join()
+            output.seek(0)
+            text = output.read().decode(errors="replace")
+        inputs = [int(number) for number in re.findall(r"^(?:#|Done )([0-9]+)", text, re.MULTILINE)]
+        failed = text.strip().rpartition("\n")[2] if process.exitcode else "none"
         seconds = time.monotonic() - started
         print(f"| {name} | {max(inputs, default=0)} | {seconds:.0f} | {failed} |", flush=True)
+
+
+def _fuzz_into(arguments: argparse.Namespace, name: str, output: int) -> None:
+    """Fuzz one target in a forked process, which writes to a file."""
+    for stream in (1, 2):
+        os.dup2(output, stream)
+    arguments.target = name
+    fuzz(arguments)
 
 
 if __name__ == "__main__":

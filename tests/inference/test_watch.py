@@ -4,10 +4,12 @@
 from __future__ import annotations
 
 import json
+import math
 import subprocess
 import sys
 from array import array
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -18,6 +20,7 @@ from scipy.spatial.transform import Rotation
 
 from doorstate.errors import ConfigError, WeightsError
 from doorstate.inference.abstention import Abstention
+from doorstate.inference.backends.onnx_backend import OnnxBackend
 from doorstate.inference.door import Door
 from doorstate.inference.door_report import DoorReport
 from doorstate.inference.known import Known
@@ -33,6 +36,7 @@ from doorstate.io.body_frame import points_in_body
 from doorstate.io.options import ReadOptions
 from doorstate.io.sensor_pose import camera_pose
 from doorstate.types import STATES, DoorState, Points
+from tests.attack.numbers import write_graph
 
 POINTS = 512
 STEP = 4  # in the image: small clouds are quick
@@ -145,6 +149,23 @@ def test_missing_data_are_never_open(predictor: Predictor, clouds: list[Points])
     assert reports[25].prediction.abstention.code == "too_few_points"
     # The filter alone would remember for two to three seconds; from silence_s on the state itself is unknown.
     assert [report.state for report in reports[25:]] == ["open"] * 9 + ["unknown"] * 3
+
+
+@pytest.mark.parametrize(
+    ("row", "state"),
+    [((0.0, 0.0, math.nan), "unknown"), ((0.0, 0.0, 1e9), "unknown"), ((0.02, 0.03, 0.95), "open")],
+)
+def test_broken_outputs_are_unknown(
+    row: tuple[float, ...], state: str, clouds: list[Points], tmp_path: Path
+) -> None:
+    write_graph(tmp_path / "door.onnx", row)
+    network = NetworkPredictor(OnnxBackend(tmp_path / "door.onnx"))
+    reports = at_10_hz(DoorWatch(WatchSettings(), network), [clouds[2]] * 25)
+    report = reports[-1]
+    assert (report.state, report.values["raw_state"]) == (state, state)
+    assert any(report.is_open for report in reports) == (state == "open")
+    code = report.prediction.abstention and report.prediction.abstention.code
+    assert code == (None if state == "open" else "invalid_outputs")
 
 
 def test_silence_is_unknown_and_resets(predictor: Predictor, clouds: list[Points]) -> None:
