@@ -141,6 +141,9 @@ def doorways(
     repeats: Repeats = 15,
 ) -> None:
     """Latency from a raw 640 x 480 cloud in memory to every door in it, by stage."""
+    from doorstate.inference.backends.threads import configure_torch
+
+    configure_torch(None, used=False)  # as `doorstate predict` does, before torch is imported
     from benchmarks.doorways import doorways_table, measure_doorways
     from doorstate.cli.progress import progress_bar
 
