@@ -47,9 +47,11 @@ except BaseException:
     raise ImportError("initialization failed") from None
 ''')
 def work():
-    import swallows
-    print("cleaned up")
-    time.sleep(60)
+    try:
+        import swallows
+        time.sleep(60)
+    finally:
+        print("cleaned up")
 main(work)
 """,
     "a finalizer": """
@@ -57,9 +59,11 @@ class Resource:
     def __del__(self):
         interrupt()
 def work():
-    Resource()
-    print("cleaned up")
-    time.sleep(60)
+    try:
+        Resource()
+        time.sleep(60)
+    finally:
+        print("cleaned up")
 main(work)
 """,
     "a library that raises its own error": """
