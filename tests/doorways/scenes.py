@@ -140,9 +140,48 @@ def glass_leaf_seen_through() -> HandMade:
 
 def dark_leaf() -> HandMade:
     """Return a closed black leaf of which nothing returns; frame and floor before it are measured."""
-    made = _with_door(Door(), 0.0, (0.2, 2.2), -94.0, pitch_deg=12.0)
-    boxes = [box._replace(material="dark") if box.part is Part.LEAF else box for box in made.boxes]
-    return HandMade(boxes, made.pose, made.doors)
+    return _darkened(_with_door(Door(), 0.0, (0.2, 2.2), -94.0, pitch_deg=12.0))
+
+
+def glazed_dark_leaf() -> HandMade:
+    """Return a closed black leaf with a pane from 0.2 m on, through which the room behind is measured."""
+    door = Door(kind="glazed", pane_bottom_m=0.2, handle=LEVER)
+    far = Space(left_m=1.5, right_m=1.5, depth_m=2.0)
+    return _darkened(_with_door(door, 0.0, (0.2, 1.9), -94.0, height_m=1.2, pitch_deg=15.0, far=far))
+
+
+def dark_leaf_seen_without_floor() -> HandMade:
+    """Return a closed black leaf so near that the floor before it is below the view."""
+    return _darkened(_with_door(Door(), 0.0, (0.2, 1.5), -94.0))
+
+
+def open_doorway_out_of_range() -> HandMade:
+    """Return an open doorway 4.8 m off, behind which everything is farther than the camera measures."""
+    near, far = Space(left_m=2.5, right_m=2.5, depth_m=6.0), Space(depth_m=6.0)
+    return _with_door(Door(swing="away"), 90.0, (-0.4, 4.8), -86.0, near=near, far=far)
+
+
+def board_before_the_lens() -> HandMade:
+    """Return a closed door behind a board of which the camera measures the farther edge only."""
+    board = Box(Part.OTHER, (0.0, 1.17, 1.0), (0.3, 0.02, 2.0), yaw_rad=math.radians(60.0))
+    return _with_door(Door(handle=LEVER), 0.0, (0.0, 1.5), -90.0, extra=(board,))
+
+
+def window_beside_a_closed_door() -> HandMade:
+    """Return a closed door beside a stretch of wall, 0.8 x 1.2 m, from which nothing comes back."""
+    window = Box(Part.OTHER, (1.1, 0.01, 1.5), (0.8, 0.02, 1.2), material="dark")
+    return _with_door(Door(handle=LEVER), 0.0, (0.4, 2.6), -95.0, extra=(window,))
+
+
+def open_double_door_with_one_closed_leaf() -> HandMade:
+    """Return a double door of which one leaf is open towards the camera."""
+    door = Door(kind="double_equal", opening_width_m=1.4, active_share=0.5, handle=LEVER)
+    return _with_door(door, 88.0, (0.5, 2.3), -102.0, far=Space(depth_m=4.0))
+
+
+def open_leaf_at_the_near_jamb() -> HandMade:
+    """Return an open leaf that hides its opening, seen along the wall."""
+    return _with_door(Door(hinge="left", handle=LEVER), 90.0, (1.9, 0.75), -160.0)
 
 
 def open_doorway_without_lintel() -> HandMade:
@@ -162,6 +201,7 @@ WITH_DOOR: dict[str, Callable[[], HandMade]] = {
         glass_leaf_seen_through,
         dark_leaf,
         open_doorway_without_lintel,
+        window_beside_a_closed_door,
     )
 }
 WITHOUT_DOOR: dict[str, Callable[[], HandMade]] = {
@@ -188,6 +228,15 @@ def _with_door(
     pose = CameraPose.from_degrees((*robot_m, height_m), heading_deg, pitch_deg, roll_deg)
     truth = describe_door(door, opening, Pose(*robot_m, math.radians(heading_deg)), height_m)
     return HandMade(boxes, pose, (truth,))
+
+
+def _darkened(made: HandMade) -> HandMade:
+    """Return the scene with everything opaque of the leaf black."""
+    boxes = [
+        box._replace(material="dark") if box.part is Part.LEAF and box.material == "matte" else box
+        for box in made.boxes
+    ]
+    return HandMade(boxes, made.pose, made.doors)
 
 
 def _without_door(boxes: Sequence[Box], robot_m: tuple[float, float], heading_deg: float) -> HandMade:

@@ -19,7 +19,9 @@ from numpy.typing import NDArray
 
 from doorstate.doorways.doorway import Doorway
 from doorstate.doorways.elevation import ROW_M, Elevation, wall_elevation
+from doorstate.doorways.expected_lines import expected_lines
 from doorstate.doorways.measured_view import MeasuredView
+from doorstate.doorways.opening_surfaces import Cells, floor_behind_share, is_across, is_flush
 from doorstate.doorways.plan_lines import Floats, Line
 from doorstate.doorways.walls import Wall
 
@@ -32,12 +34,6 @@ _MIN_EXPECTED = 6.0  # sight lines of a cell: one in 400 such cells is empty by 
 _BEFORE_M = (0.1, 1.0)  # floor before an opening
 _FLOOR_M = 0.1  # of a point to the height of the floor
 _MIN_FLOOR_POINTS = 8
-# Largest difference between the depth of a flush cell and the median depth of the opening: at least the first, at most
-# the second, and between them three times the scatter of the wall on both sides.
-_FLUSH_M, _MAX_FLUSH_M = 0.05, 0.1
-_SCATTERS = 3.0
-
-Cells = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,9 +59,33 @@ class DoorwayEvidence:
     @cached_property
     def flush(self) -> float:
         """Share in which a surface lies in one plane along the wall, as the wall itself or a closed leaf does."""
+        return self.on_wall * _mean(self._is_flush[self._has_surface])
+
+    @cached_property
+    def across(self) -> float:
+        """Share in which the far jamb was measured, or a leaf that stands before the near one."""
+        return self.on_wall * _mean(self._is_across[self._has_surface])
+
+    @property
+    def free(self) -> float:
+        """Share before and across which nothing stands."""
+        return max(0.0, 1 - self.hidden - self.across)
+
+    @cached_property
+    def floor_behind(self) -> float:
+        """Share of the sight lines expected on the floor behind that ended behind; NaN if too few are expected."""
         about = self.about
-        relief_m = np.where(about.lines[0] > 0, about.elevation.relief_m[about.stretch, _ROWS], np.nan)
-        return self.on_wall * _flush(relief_m, about.in_view, about.rims)
+        # Other surfaces, as of a leaf in the opening, neither show the floor behind nor exclude it.
+        is_other = (self._has_surface & ~self._is_flush) | (about.lines[2] > 0)
+        along_m, distance_m = about.along_m, about.wall.distance_m
+        return floor_behind_share(
+            about.lines[1],
+            np.where(is_other, 0.0, about.expected * about.in_view),
+            np.stack([np.hypot(along_m, distance_m), np.full(len(along_m), distance_m)], axis=1),
+            (np.arange(_ROWS.start, _ROWS.stop) + 0.5) * ROW_M,
+            -about.doorway.floor_z_m,
+            self.farthest_m,
+        )
 
     @cached_property
     def rim_m(self) -> float:
@@ -94,6 +114,30 @@ class DoorwayEvidence:
         return _has_floor_before(self.about.view.points, self.about.doorway)
 
     @cached_property
+    def _relief_m(self) -> Cells:
+        about = self.about
+        relief_m: Cells = np.where(
+            about.lines[0] > 0, about.elevation.relief_m[about.stretch, _ROWS], np.nan
+        ).astype(np.float64)
+        return relief_m
+
+    @cached_property
+    def _has_surface(self) -> NDArray[np.bool_]:
+        has_surface: NDArray[np.bool_] = (self.about.in_view > 0) & np.isfinite(self._relief_m)
+        return has_surface
+
+    @cached_property
+    def _is_across(self) -> NDArray[np.bool_]:
+        about, half_m = self.about, self.about.doorway.width_m / 2
+        ends_m = about.middle_m - half_m, about.middle_m + half_m
+        return is_across(about.along_m, self._relief_m, about.wall.distance_m, ends_m)
+
+    @cached_property
+    def _is_flush(self) -> NDArray[np.bool_]:
+        relief_m = np.where(self._is_across, np.nan, self._relief_m)
+        return is_flush(relief_m, self.about.in_view, self.about.rims)
+
+    @cached_property
     def _ranges_m(self) -> Cells:
         about = self.about
         return _ranges_m(about.elevation, about.wall, about.doorway.floor_z_m)[about.stretch, _ROWS]
@@ -105,12 +149,19 @@ class _About(NamedTuple):
     view: MeasuredView
     doorway: Doorway
     wall: Wall
+    middle_m: float  # of the opening along the wall
     elevation: Elevation
     stretch: NDArray[np.bool_]  # columns of the elevation
     lines: Cells  # (3, columns, rows) sight lines that end on the wall, behind and before it
     rims: tuple[NDArray[np.bool_], NDArray[np.bool_]]  # columns to the right and left of the opening
     in_view: Cells
+    expected: Cells  # sight lines
     is_missing: NDArray[np.bool_]
+
+    @property
+    def along_m(self) -> Floats:
+        """Places of the columns along the wall."""
+        return self.elevation.positions_m[self.stretch]
 
 
 def find_evidence(view: MeasuredView, doorway: Doorway) -> DoorwayEvidence:
@@ -130,10 +181,12 @@ def find_evidence(view: MeasuredView, doorway: Doorway) -> DoorwayEvidence:
     rims = (-offsets_m > half_m, offsets_m > half_m)
     kinds = np.stack([elevation.on_wall, elevation.through, elevation.hidden])[:, stretch, _ROWS]
     lines: Cells = kinds.astype(np.float64)
-    in_view, expected = _expected(lines.sum(axis=0), opening, rims)
+    in_view, expected = expected_lines(lines.sum(axis=0), opening, rims)
     shares, is_missing = _shares(lines, expected, in_view, rims)
     share_in_view = float(in_view[opening].mean()) if opening.any() else 0.0
-    about = _About(view, doorway, wall, elevation, stretch, lines, rims, in_view, is_missing)
+    about = _About(
+        view, doorway, wall, middle_m, elevation, stretch, lines, rims, in_view, expected, is_missing
+    )
     return DoorwayEvidence(share_in_view, *shares, about)
 
 
@@ -162,43 +215,6 @@ def _ranges_m(elevation: Elevation, wall: Wall, floor_z_m: float) -> Cells:
         depth_m = np.where(counts > 0, depths_m, depth_m)
     ranges_m: Cells = to_plane_m * (1 + depth_m / distance_m)
     return ranges_m
-
-
-def _expected(
-    seen: Cells, opening: NDArray[np.bool_], rims: Sequence[NDArray[np.bool_]]
-) -> tuple[Cells, Cells]:
-    """Return the cells (columns, rows) of the opening that are in view, and the sight lines expected in each.
-
-    Sight lines through a plane get fewer smoothly with its range, whatever they end on, so that those of the rims tell
-    how many to expect between them. With one rim in view, cells count up to the outermost that was seen.
-    """
-    right, left = (_row_density(seen[rim]) for rim in rims)
-    share = np.linspace(0, 1, int(opening.sum()))[:, None]  # from the right rim to the left one
-    both = (right > 0) & (left > 0)
-    one = np.maximum(right, left)
-    floor = 1e-9
-    between = np.maximum(right, floor) ** (1 - share) * np.maximum(left, floor) ** share
-    filled = seen[opening] > 0
-    from_right = np.cumsum(filled[::-1], axis=0)[::-1] > 0  # up to the outermost seen cell
-    from_left = np.cumsum(filled, axis=0) > 0
-    up_to = np.where(right > 0, from_right, from_left) & (one > 0)
-    expected = np.where(both, between, np.broadcast_to(one, between.shape))
-    shape = seen.shape
-    in_view, all_expected = np.zeros(shape, dtype=bool), np.zeros(shape)
-    in_view[opening] = np.where(both, True, up_to)
-    all_expected[opening] = expected
-    return in_view.astype(np.float64), all_expected
-
-
-def _row_density(rim: Cells) -> Cells:
-    """Return the mean number of sight lines (rows) of the cells of a rim that were measured; 0 where too few were."""
-    if len(rim) == 0:
-        return np.zeros(rim.shape[1])
-    padded = np.concatenate([rim[:, :1], rim, rim[:, -1:]], axis=1)
-    about = (padded[:, :-2] + padded[:, 1:-1] + padded[:, 2:]) / 3
-    filled = np.count_nonzero(about, axis=0)
-    density: Cells = np.where(filled >= 2, about.sum(axis=0) / np.maximum(filled, 1), 0)
-    return density
 
 
 def _shares(
@@ -235,22 +251,6 @@ def _filled_share(seen: Cells, pool: int) -> float:
     return float(filled.mean()) if filled.any() else 1.0
 
 
-def _flush(relief_m: Cells, in_view: Cells, rims: Sequence[NDArray[np.bool_]]) -> float:
-    """Return the share of the cells with a surface in which it is as deep as the middle one of the opening."""
-    depths_m = relief_m[(in_view > 0) & np.isfinite(relief_m)]
-    if len(depths_m) == 0:
-        return 0.0
-    # The scatter of the wall itself is that of the sensor and of the doorway's direction.
-    scatters_m = [_scatter_m(relief_m[rim]) for rim in rims]
-    near_m = min(max(_FLUSH_M, _SCATTERS * max(scatters_m)), _MAX_FLUSH_M)
-    return float((np.abs(depths_m - np.median(depths_m)) <= near_m).mean())
-
-
-def _scatter_m(relief_m: Cells) -> float:
-    finite_m = relief_m[np.isfinite(relief_m)]
-    return float(np.median(np.abs(finite_m - np.median(finite_m)))) if len(finite_m) else 0.0
-
-
 def _pooled(cells: Cells, pool: int) -> Cells:
     """Return the sums of blocks of cells (..., columns, rows)."""
     if pool == 1:
@@ -279,6 +279,10 @@ def _has_floor_before(points: NDArray[np.float32], doorway: Doorway) -> bool:
     x, y, _ = doorway.to_doorway(low).T
     before = (np.abs(x) < doorway.width_m / 2) & (y > _BEFORE_M[0]) & (y < _BEFORE_M[1])
     return int(before.sum()) >= _MIN_FLOOR_POINTS
+
+
+def _mean(values: NDArray[np.bool_]) -> float:
+    return float(values.mean()) if len(values) else 0.0
 
 
 def _median(values: Floats) -> float:

@@ -18,7 +18,7 @@ from doorstate.doorways.reach import Reach
 Hinge = Literal["left", "right"]
 Angles = tuple[float, ...]
 
-OPEN_ANGLES_DEG: Angles = tuple(float(angle) for angle in range(60, 176, 5))
+OPEN_ANGLES_DEG: Angles = tuple(float(angle) for angle in range(60, 136, 5))  # beyond, walls look like leaves
 SEMI_OPEN_ANGLES_DEG: Angles = tuple(float(angle) for angle in range(10, 91, 5))
 _SIDE_M = 0.05  # of the cells in plan view; points in the 3 x 3 about a place lie within 8 cm on average
 _LEVEL_M, _LOWEST_M = 0.3, 0.1
@@ -28,7 +28,7 @@ _STEPS = 8
 _BEYOND_M = (0.15, 0.25)  # of the free edge
 _BESIDE = 2  # angles on each side of that of a wall
 _WALL_M = (-0.25, 0.15)  # beside the opening: the wall itself, which a leaf folded back lies on
-_MIN_WIDTH_M = 0.55  # of one leaf of double doors
+MIN_WIDTH_M = 0.55  # of one leaf of double doors
 _MIN_CELLS = 10  # of the leaf, in view
 _OUTER, _MIN_OUTER_CELLS = 4, 5  # outer steps of the leaf, and least cells in view there: reveals have none
 
@@ -57,7 +57,7 @@ def sweep_leaf(
         angles_deg: opening angles to look at.
         min_share: least share of the cells of a leaf in view that were measured.
     """
-    widths_m = [doorway.width_m] + [doorway.width_m / 2] * (doorway.width_m >= 2 * _MIN_WIDTH_M)
+    widths_m = [doorway.width_m] + [doorway.width_m / 2] * (doorway.width_m >= 2 * MIN_WIDTH_M)
     occupied = _occupied(view, doorway)
     best: SeenLeaf | None = None
     for width_m in widths_m:
@@ -97,9 +97,10 @@ def _best_leaf(
     shares = np.where(is_enough, np.minimum(shares_of[0], shares_of[1]), 0.0)
     goes_on = (shares_of[2] > 0.5) | (shares_of[3] > 0.5)
     shares[_widened(goes_on)] = 0.0
-    hinge, swing, number = (int(index) for index in np.unravel_index(int(shares.argmax()), shares.shape))
-    if shares[hinge, swing, number] == 0:
+    hinge, swing, first = (int(index) for index in np.unravel_index(int(shares.argmax()), shares.shape))
+    if shares[hinge, swing, first] == 0:
         return None
+    number = _middle(shares[hinge, swing], first)
     return SeenLeaf(
         float(shares[hinge, swing, number]),
         float(angles_deg[number]),
@@ -107,6 +108,12 @@ def _best_leaf(
         "towards" if swing else "away",
         width_m,
     )
+
+
+def _middle(shares: NDArray[np.float64], first: int) -> int:
+    """Return the middle of the run of equal shares that starts at an angle."""
+    others = np.flatnonzero(shares[first:] != shares[first])
+    return first + ((int(others[0]) if len(others) else len(shares) - first) - 1) // 2
 
 
 def _widened(is_wall: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -13,11 +14,12 @@ import numpy as np
 from doorstate.doorways.doorway import Doorway
 from doorstate.doorways.evidence import DoorwayEvidence, find_evidence
 from doorstate.doorways.finder import thinned
-from doorstate.doorways.leaf_sweep import SEMI_OPEN_ANGLES_DEG, sweep_leaf
+from doorstate.doorways.leaf_shape import find_leaf_angle_deg
+from doorstate.doorways.leaf_sweep import MIN_WIDTH_M, SEMI_OPEN_ANGLES_DEG, Hinge, SeenLeaf, sweep_leaf
 from doorstate.doorways.measured_view import MeasuredView
 from doorstate.inference.abstention import Abstention
 from doorstate.inference.door import Door
-from doorstate.inference.seen_through import FloorRays, floor_rays
+from doorstate.inference.seen_through import FloorRays, Opening, floor_rays
 from doorstate.types import DoorState, Points
 
 _MAX_POINTS = 12_000  # of a cloud: eight for each cell of a door 2.5 m away
@@ -28,10 +30,18 @@ _MIN_THROUGH = 0.1
 _MAX_HIDDEN = 0.6
 _FILLED = 0.75  # of what nothing hides of an opening, by a surface along the wall
 _BLOCKED = 0.5  # of an opening by surfaces, where nothing else confirms that it is open
-_MIN_FILLED = 0.3  # of an opening, of which at least half is in view
-_CROSSED = 0.05  # of an opening of which much is missing
+_MIN_FILLED = 0.1  # of an opening, of which at least half is in view
+_MAX_FLUSH, _MIN_FREE = (
+    0.5,
+    0.2,
+)  # of what nothing hides of an opening beside a leaf, by a surface along the wall
+_CROSSED = 0.05  # of an opening that is not closed
+_RETURNED = 0.95  # of the rays to the floor behind an opening: few come back from a dark leaf
+_MIN_OPEN_DEG = 65.0  # doors are called open from 75 degrees on, semi-open up to 65
 _LEAF, _WHOLE_LEAF = 0.7, 0.95  # of the cells of a leaf in view: of an opening that is crossed, and of others
-_MIN_SEEN_FLOOR = 0.7  # of the rays to it: a pane in a dark leaf shows its farther part only
+_MIN_SEEN_FLOOR = 0.9  # of the rays to it
+_NO_FLOOR = 0.2  # of the sight lines expected on the floor behind an opening
+_CLEAR, _MAX_LOST = 0.9, 0.05  # of what nothing hides of an opening, and missing of all of it
 _MIN_SPACE = 0.35  # of an opening in which sight lines end behind the wall, where they cannot tell more
 _GLASS = 0.05  # of an opening that is seen through, although little came back
 _NEAR_RATIO, _NEAR_M = 1.25, 1.0  # of the surroundings of a hole to the least range of the cloud, and at most
@@ -66,17 +76,17 @@ class _Case:
     @cached_property
     def floor_rays(self) -> FloorRays | None:
         """Rays to the floor behind the opening."""
-        points = self.view.points
-        measured = np.ones(len(points), dtype=bool)
-        return floor_rays(points, measured, self.door.opening, self.limits.free_reach_m)
+        points, place = self.view.points, self.doorway
+        opening = Opening.in_frame(place.x_m, place.y_m, place.yaw_deg, place.width_m)
+        return floor_rays(points, np.ones(len(points), dtype=bool), opening, self.limits.free_reach_m)
 
     @property
     def passes(self) -> bool:
-        """True if the floor behind the opening was measured through it."""
-        rays = self.floor_rays
-        if rays is None:
+        """True if the floor behind the opening was measured, from the wall on: a pane shows its farther part only."""
+        rays, least = self.floor_rays, self.limits.min_floor_share
+        if rays is None or rays.seen < _MIN_SEEN_FLOOR:
             return False
-        return rays.passed >= self.limits.min_floor_share and rays.seen >= _MIN_SEEN_FLOOR
+        return rays.passed >= least or self.evidence.floor_behind >= least
 
 
 def check_doorways(cloud: Points, doors: Sequence[Door], limits: DoorwayLimits) -> list[DoorwayCheck]:
@@ -129,22 +139,53 @@ def _check_semi_open(case: _Case) -> DoorwayCheck:
 
 
 def _check_open(case: _Case) -> DoorwayCheck:
-    """Require an opening that is not filled, and a leaf or the floor behind it."""
-    evidence = case.evidence
-    if _is_filled(evidence) and not case.passes:
+    """Require an opening that is not filled, and a leaf or the floor behind it; of double doors, behind one leaf."""
+    leaf = _open_leaf(case)
+    check = _check_passage(case, leaf)
+    if check.abstention is None or case.doorway.width_m < 2 * MIN_WIDTH_M:
+        return check
+    halves = [
+        _check_passage(half, leaf if leaf is not None and leaf.hinge == hinge else None)
+        for hinge in ("left", "right")
+        if (half := _half(case, hinge)).evidence.in_view >= _MIN_IN_VIEW
+    ]
+    passed = [half for half in halves if half.abstention is None]
+    return max(passed, key=lambda half: bool(half.leaf_seen), default=check)
+
+
+def _open_leaf(case: _Case) -> SeenLeaf | None:
+    """Return the surface that has the place and the shape of an open leaf, or None."""
+    leaf = sweep_leaf(case.view, case.doorway, min_share=_LEAF)
+    angle_deg = None if leaf is None else find_leaf_angle_deg(case.view, case.doorway, leaf)
+    return None if leaf is None or angle_deg is None or angle_deg < _MIN_OPEN_DEG else leaf
+
+
+def _half(case: _Case, hinge: Hinge) -> _Case:
+    """Return one half of a wide doorway."""
+    doorway, yaw = case.doorway, math.radians(case.doorway.yaw_deg)
+    shift_m = doorway.width_m / 4 * (1 if hinge == "left" else -1)
+    half = replace(
+        doorway,
+        x_m=doorway.x_m + shift_m * math.cos(yaw),
+        y_m=doorway.y_m + shift_m * math.sin(yaw),
+        width_m=doorway.width_m / 2,
+    )
+    return replace(case, doorway=half, evidence=find_evidence(case.view, half))
+
+
+def _check_passage(case: _Case, leaf: SeenLeaf | None) -> DoorwayCheck:
+    evidence, passes, rays = case.evidence, case.passes, case.floor_rays
+    if _is_filled(evidence) and not passes:
         return DoorwayCheck(Abstention("opening_blocked", {"share": evidence.flush}))
-    hidden = _hidden(evidence, _MAX_HIDDEN)
-    is_measured = evidence.missing <= case.limits.max_missing_share
-    # Furniture before a dark leaf may look like a part of a leaf; nothing passes it.
-    is_crossed = is_measured or evidence.through >= _CROSSED or case.passes
-    if sweep_leaf(case.view, case.doorway, min_share=_LEAF if is_crossed else _WHOLE_LEAF) is not None:
+    # Furniture before a closed or dark leaf may look like a part of a leaf; nothing passes it.
+    is_crossed = passes or evidence.through >= _CROSSED or (rays is not None and rays.seen >= _RETURNED)
+    is_leaf = leaf is not None and leaf.share >= (_LEAF if is_crossed else _WHOLE_LEAF)
+    if is_leaf and evidence.flush <= _MAX_FLUSH * max(evidence.free, _MIN_FREE):
         return DoorwayCheck(None, leaf_seen=True)
+    hidden = _hidden(evidence, _MAX_HIDDEN)
     if hidden is not None:
         return DoorwayCheck(hidden)
-    # Seen along the wall, sight lines end on what bounds the opening. Things behind without their floor are seen
-    # through glass, but the floor may be out of view.
-    space = evidence.on_wall - evidence.flush + (evidence.through if case.floor_rays is None else 0.0)
-    if case.passes or (is_measured and space >= _MIN_SPACE):
+    if passes or _is_clear(evidence) or _has_space(evidence, rays, case.limits.max_missing_share):
         return DoorwayCheck(None, leaf_seen=False)
     if evidence.on_wall >= _BLOCKED:
         return DoorwayCheck(Abstention("opening_blocked", {"share": evidence.on_wall}))
@@ -152,11 +193,23 @@ def _check_open(case: _Case) -> DoorwayCheck:
 
 
 def _is_filled(evidence: DoorwayEvidence) -> bool:
-    free_of_clutter = 1 - evidence.hidden
-    is_surface = (
-        evidence.flush >= max(_MIN_FILLED, _FILLED * free_of_clutter) and evidence.through < _MIN_THROUGH
-    )
-    return is_surface and evidence.in_view >= 0.5
+    is_surface = evidence.flush >= max(_MIN_FILLED, _FILLED * evidence.free)
+    return is_surface and evidence.through < _MIN_THROUGH and evidence.in_view >= 0.5
+
+
+def _is_clear(evidence: DoorwayEvidence) -> bool:
+    """Return True if sight lines pass everywhere, below and above any pane in a leaf."""
+    return evidence.missing <= _MAX_LOST and evidence.through >= max(_CLEAR * evidence.free, _MIN_THROUGH)
+
+
+def _has_space(evidence: DoorwayEvidence, rays: FloorRays | None, most_missing: float) -> bool:
+    """Return True if sight lines end on what bounds an opening, as they do where it is seen along the wall.
+
+    Things behind without their floor are seen through glass, but the floor may be out of view.
+    """
+    if evidence.floor_behind < _NO_FLOOR or evidence.missing > most_missing * (1 - evidence.across):
+        return False
+    return evidence.on_wall - evidence.flush + (evidence.through if rays is None else 0.0) >= _MIN_SPACE
 
 
 def _hidden(evidence: DoorwayEvidence, most: float) -> Abstention | None:
