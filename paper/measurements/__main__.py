@@ -116,6 +116,21 @@ def doors(
 
 
 @app.command()
+def doorway_gate(
+    out: Out = Path("docs/benchmarks"),
+    scenes: Annotated[int, typer.Option(help="Scenes of each preset and sensor.", min=1)] = 50,
+) -> None:
+    """Count true doorways whose state the check confirms, by what their leaf is made of."""
+    from doorstate.cli.progress import progress_bar
+
+    from .doorway_gate import doorway_gate_table, measure_doorway_gate
+
+    with progress_bar("doorways") as progress:
+        table = doorway_gate_table(measure_doorway_gate(scenes, progress))
+    _write(table, out / "doorway-gate.md", scenes=scenes)
+
+
+@app.command()
 def thinning(out: Out = Path("docs/benchmarks"), network: Network = "pointnet2", count: Count = 300) -> None:
     """Compare predictions and times of sampling from a part of the points with those from all points."""
     from doorstate.cli.progress import progress_bar

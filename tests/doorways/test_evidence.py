@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from doorstate.doorways.doorway import Doorway
-from doorstate.doorways.evidence import _pooled, _row_density, find_evidence
+from doorstate.doorways.evidence import _pooled, find_evidence
+from doorstate.doorways.expected_lines import row_density
 from doorstate.doorways.finder import thinned
 from doorstate.doorways.leaf_sweep import SEMI_OPEN_ANGLES_DEG, _counts, _widened, sweep_leaf
 from doorstate.doorways.measured_view import MeasuredView
@@ -132,7 +133,7 @@ def test_pooled_cells_equal_sums_of_padded_blocks(pool: int) -> None:
 
 def test_density_of_rows_equals_a_loop() -> None:
     rim = np.random.default_rng(0).poisson(0.4, (11, 19)).astype(np.float64)
-    density = _row_density(rim)
+    density = row_density(rim)
     for row in range(19):
         rows = [max(0, row - 1), row, min(18, row + 1)]
         about = [sum(column[rows]) / 3 for column in rim]

@@ -82,7 +82,7 @@ class DoorwayEvidence:
             about.lines[1],
             np.where(is_other, 0.0, about.expected * about.in_view),
             np.stack([np.hypot(along_m, distance_m), np.full(len(along_m), distance_m)], axis=1),
-            (np.arange(_ROWS.start, _ROWS.stop) + 0.5) * ROW_M,
+            np.linspace(_ROWS.start + 0.5, _ROWS.stop - 0.5, _ROWS.stop - _ROWS.start) * ROW_M,
             -about.doorway.floor_z_m,
             self.farthest_m,
         )

@@ -19,7 +19,7 @@ def expected_lines(
     Sight lines through a plane get fewer smoothly with its range, whatever they end on, so that those of the rims tell
     how many to expect between them. With one rim in view, cells count up to the outermost that was seen.
     """
-    right, left = (_row_density(seen[rim]) for rim in rims)
+    right, left = (row_density(seen[rim]) for rim in rims)
     share = np.linspace(0, 1, int(opening.sum()))[:, None]  # from the right rim to the left one
     both = (right > 0) & (left > 0)
     one = np.maximum(right, left)
@@ -37,7 +37,7 @@ def expected_lines(
     return in_view.astype(np.float64), all_expected
 
 
-def _row_density(rim: Cells) -> Cells:
+def row_density(rim: Cells) -> Cells:
     """Return the mean number of sight lines (rows) of the cells of a rim that were measured; 0 where too few were."""
     if len(rim) == 0:
         return np.zeros(rim.shape[1])
