@@ -10,7 +10,8 @@ from typing import NamedTuple
 from doorstate._jobs import Progress
 from doorstate.evaluation.table import Table
 from doorstate.inference.door import Door
-from doorstate.inference.gate import DEFAULT_GATE, DoorwayCheck
+from doorstate.inference.doorway_check import DoorwayCheck
+from doorstate.inference.gate import DEFAULT_GATE
 from doorstate.simulation.generate import simulate_rows
 from doorstate.simulation.presets import PRESETS, PresetName
 from doorstate.simulation.truth import TrueDoor, true_doors

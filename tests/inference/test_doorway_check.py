@@ -169,6 +169,15 @@ def test_open_doors_seen_along_the_wall_are_not_blocked(preset: str, sensor: str
     assert _code(DEFAULT_GATE.check_doorways(frames[opened].points, [door])[0]) is None
 
 
+def test_a_sliding_leaf_behind_a_thick_wall_blocks_its_opening() -> None:
+    rows, frames = simulate_rows(PRESETS["varied"], 66002, 46, "d435")
+    (closed,) = [number for number, row in enumerate(rows) if row.state == "closed"]
+    true = true_doors(rows[closed])[0]
+    assert true.kind == "sliding"
+    door = Door(true.x_m, true.y_m, true.yaw_deg, true.width_m, DoorState.OPEN, floor_z_m=true.floor_z_m)
+    assert _code(DEFAULT_GATE.check_doorways(frames[closed].points, [door])[0]) == "opening_blocked"
+
+
 def test_a_leaf_of_glass_is_never_a_seen_leaf() -> None:
     assert _check(scenes.glass_leaf_seen_through(), DoorState.OPEN) == DoorwayCheck(None, leaf_seen=False)
     assert _code(_check(scenes.glass_leaf_seen_through(), DoorState.CLOSED)) == "door_glass"

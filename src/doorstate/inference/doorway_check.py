@@ -175,7 +175,8 @@ def _half(case: _Case, hinge: Hinge) -> _Case:
 
 def _check_passage(case: _Case, leaf: SeenLeaf | None) -> DoorwayCheck:
     evidence, passes, rays = case.evidence, case.passes, case.floor_rays
-    if _is_filled(evidence) and not passes:
+    # A sliding leaf behind a thick wall lies so far behind its face that rays seem to pass.
+    if _is_filled(evidence) and not evidence.floor_behind >= case.limits.min_floor_share:
         return DoorwayCheck(Abstention("opening_blocked", {"share": evidence.flush}))
     # Furniture before a closed or dark leaf may look like a part of a leaf; nothing passes it.
     is_crossed = passes or evidence.through >= _CROSSED or (rays is not None and rays.seen >= _RETURNED)
