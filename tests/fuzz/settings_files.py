@@ -71,7 +71,7 @@ b = "data"
 _MAX_PIXELS = 2000
 _OPTIONS: dict[str, dict[str, Any]] = {
     "pointnet": {"batchnorm_eps": 1e-3},
-    "pointnet2": {"radii": [0.1, 0.2], "num_samples": 8},
+    "pointnet2": {"radii": [0.1, 0.2], "num_samples": 8, "centres": [256, 64]},
     "dgcnn": {"k": 20},
     "point2sequence": {"region_feature": "attention", "dilation": 2},
 }

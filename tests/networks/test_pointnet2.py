@@ -76,6 +76,14 @@ def test_shapes_of_the_levels(variant: str, channels: tuple[int, int]) -> None:
     assert torch.equal(centres, clouds(1, 600)[:, :128])  # the prefix, in order
 
 
+def test_fewer_centres_are_the_first_ones_with_the_same_weights() -> None:
+    network, coarse = PointNet2().eval(), PointNet2(centres=(256, 64)).eval()
+    coarse.load_state_dict(network.state_dict())
+    network.use_centres(0.5)
+    with torch.no_grad():
+        assert torch.equal(coarse(clouds(1, 600)), network(clouds(1, 600)))
+
+
 def test_multi_scale_grouping_trains() -> None:
     network = PointNet2(variant="msg", num_samples=8)
     assert {n for level in (network.level1, network.level2) for _, n in level.balls} == {8}

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor, nn
 
-from doorstate.errors import unknown_name
+from doorstate.errors import ConfigError, unknown_name
 from doorstate.networks.base import Encoding, Neighbourhoods, PointNetwork
 from doorstate.networks.kernels.ball_query import ball_query
 from doorstate.networks.kernels.gather import first_rows, gather_rows
@@ -91,10 +91,11 @@ class PointNet2(PointNetwork):
         variant: "ssg" or "msg".
         radii: ball radius of the two levels, in the unit of the points; "msg" adds half and twice of each.
         num_samples: points per ball of every scale instead of the variant's own numbers.
+        centres: number of centres of the two levels; time grows with them, the number of parameters does not.
         batchnorm_eps: epsilon of every batch normalisation; 1e-3 in the original.
 
     Raises:
-        ConfigError: unknown variant.
+        ConfigError: unknown variant, or no numbers of centres.
     """
 
     feature_size = 1024
@@ -108,18 +109,21 @@ class PointNet2(PointNetwork):
         variant: str = "ssg",
         radii: tuple[float, float] = (0.2, 0.4),
         num_samples: int | None = None,
+        centres: tuple[int, int] = (512, 128),
         batchnorm_eps: float = 1e-5,
     ) -> None:
         super().__init__()
         if variant not in VARIANTS:
             raise unknown_name("pointnet2 variant", variant, VARIANTS)
+        if len(centres) != len(radii) or min(centres) < 1:
+            raise ConfigError("no numbers of two levels", field="centres", expected="two of at least 1")
         levels, dropout = VARIANTS[variant]
         first, second = (
             [scale._replace(num_samples=num_samples or scale.num_samples) for scale in level]
             for level in levels
         )
-        self.level1 = SetAbstraction(512, radii[0], first, num_features=0)
-        self.level2 = SetAbstraction(128, radii[1], second, self.level1.out_channels)
+        self.level1 = SetAbstraction(centres[0], radii[0], first, num_features=0)
+        self.level2 = SetAbstraction(centres[1], radii[1], second, self.level1.out_channels)
         self.level3 = PooledMLP(self.level2.out_channels, (256, 512, 1024))
         self.head = classification_head(self.feature_size, num_classes, dropout)
         set_batchnorm(self, eps=batchnorm_eps)

@@ -176,6 +176,7 @@ def train_fold(
     extra_train_datasets = experiment.extra_train_datasets if recipe.epochs else ()
     config = RunConfig(
         network=network,
+        network_options=experiment.network_options.get(network, {}),
         dataset=experiment.dataset,
         protocol=experiment.protocol,
         fold=fold,

@@ -37,6 +37,7 @@ class Experiment(FrozenModel):
     recipe_changes: dict[str, Any] = Field(default_factory=dict)  # fields of the recipe
     # By network; these win over `recipe_changes`.
     network_changes: dict[str, dict[str, Any]] = Field(default_factory=dict)
+    network_options: dict[str, dict[str, Any]] = Field(default_factory=dict)  # of the class of a network, by name
     # Folder of a comparison: runs start from its weights of the same network and fold. Networks that it does not have
     # start from random weights.
     start_from: str | None = None
@@ -76,7 +77,7 @@ class Experiment(FrozenModel):
             raise self._error("protocol", f"no protocol {self.protocol!r}", " or ".join(PROTOCOLS))
         if self.protocol in ONE_FOLD and self.folds != 1:
             raise self._error("folds", f"protocol {self.protocol} has one fold", "1")
-        for name in self.network_changes:
+        for name in (*self.network_changes, *self.network_options):
             network_class(name)
         for network in self.networks:
             self._check_network(network)
@@ -85,7 +86,7 @@ class Experiment(FrozenModel):
 
     def _check_network(self, network: str) -> None:
         recipe = self.recipe_of(network)
-        add_heads(create_network(network), self.heads_of(network))
+        add_heads(create_network(network, **self.network_options.get(network, {})), self.heads_of(network))
         if recipe.epochs and self.protocol == UNSEEN:
             raise self._error("recipe_changes.epochs", f"protocol {UNSEEN} trains nothing", "0")
         heads = (STATE, *self.heads)
