@@ -14,7 +14,7 @@ from doorstate.clouds.augmentation import Augmentation
 from doorstate.evaluation.heads import head_errors, head_rows, score_four_labels
 from doorstate.evaluation.method_scores import MACRO, score_states
 from doorstate.evaluation.results import Results
-from doorstate.networks.card import WeightsCard
+from doorstate.networks.card import HeadErrors, WeightsCard
 from doorstate.training.run_folder import RunFolder
 from doorstate.types import STATES
 
@@ -31,6 +31,7 @@ class Evidence:
         default_points: number of points that loses nothing; None if no study tells.
         calibration_error: expected calibration error after scaling.
         comparisons: published results to show on the card.
+        errors: standard errors of the heads; None where they were not measured.
         named: share of tested doors that are given a state, and share of these that is correct; None without threshold.
     """
 
@@ -39,6 +40,7 @@ class Evidence:
     default_points: int | None
     calibration_error: float
     comparisons: tuple[Results, ...]
+    errors: HeadErrors | None = None
     named: tuple[float, float] | None = None
 
 

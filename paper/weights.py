@@ -16,7 +16,7 @@ import numpy as np
 
 from doorstate._files import write_text
 from doorstate.evaluation.calibration import calibrate, labels_and_probabilities, reliability
-from doorstate.evaluation.heads import head_rows
+from doorstate.evaluation.heads import head_rows, standard_errors
 from doorstate.evaluation.resolution import fewest_points, score_resolution
 from doorstate.evaluation.results import Results
 from doorstate.inference.export import write_weights_graph
@@ -71,6 +71,7 @@ def package_weights(
                 "temperature": evidence.temperature,
                 "abstain_below": evidence.abstain_below,
                 "default_points": evidence.default_points,
+                "errors": evidence.errors,
             }
         )
         path = (out or paths.PRETRAINED) / f"{prefix}{network_name}.safetensors"
@@ -126,6 +127,7 @@ def test_evidence(experiment: str, network: str, trained_points: int) -> Evidenc
         default_points=default_points(experiment, network, trained_points),
         calibration_error=reliability(calibration.true, calibration.scaled).error,
         comparisons=(results,),
+        errors=standard_errors(results, network),
         named=(float(named.mean()), float(correct[named].mean()) if named.any() else float("nan")),
     )
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +22,7 @@ from doorstate.evaluation.heads import (
     score_heads,
     score_parts,
     score_presence,
+    standard_errors,
 )
 from doorstate.evaluation.predictions import load_results
 from doorstate.evaluation.report import render_report
@@ -52,8 +54,7 @@ def write_comparison(dataset: PreparedDataset, folder: Path, wrong_hinges: int) 
         run = folder / "runs" / "pointnet2" / f"fold{fold}"
         outputs = []
         for row in rows:
-            output = {name: str(float(row[name] or 0) + offset) for name, offset in OFFSETS.items()}
-            output["opening_angle_deg"] = str(float(row["opening_angle_deg"] or 0) + 4)
+            output = _moved(row)
             p_door = 0.9
             if row["state"] == NO_DOOR:
                 empty += 1
@@ -65,19 +66,29 @@ def write_comparison(dataset: PreparedDataset, folder: Path, wrong_hinges: int) 
             output |= {"p_door": str(p_door), "p_hinge_left": str(float(left))}
             outputs.append({"sample_id": row["sample_id"]} | output)
         write_csv(run / "head_outputs.csv", outputs)
-        write_csv(
-            run / "predictions.csv",
-            [
-                {"sample_id": row["sample_id"], "state": row["state"], "predicted": row["state"]}
-                | {f"p_{state}": str(float(state == row["state"])) for state in STATES}
-                for row in rows
-                if row["state"] != NO_DOOR
-            ],
-        )
+        write_csv(run / "predictions.csv", _right_states(rows))
+        validated = [row for row in dataset.rows if roles[row["sample_id"]] == "val"]
+        write_csv(run / "validation.csv", _right_states(validated))
+        write_csv(run / "validation_heads.csv", [{"sample_id": row["sample_id"]} | _moved(row) for row in validated])
         counts = np.zeros((6, 6), dtype=int)
         counts[:2, :2] = [[8, 2], [0, 10]]
         (run / "metrics.json").write_text(json.dumps({"test_part_counts": counts.tolist()}))
     return folder
+
+
+def _moved(row: Mapping[str, str]) -> dict[str, str]:
+    """Return the true values of a row with `OFFSETS`, and 4 degrees too wide."""
+    offsets = OFFSETS | {"opening_angle_deg": 4}
+    return {name: str(float(row[name] or 0) + offset) for name, offset in offsets.items()}
+
+
+def _right_states(rows: Sequence[Mapping[str, str]]) -> list[dict[str, str]]:
+    return [
+        {"sample_id": row["sample_id"], "state": row["state"], "predicted": row["state"]}
+        | {f"p_{state}": str(float(state == row["state"])) for state in STATES}
+        for row in rows
+        if row["state"] != NO_DOOR
+    ]
 
 
 @pytest.fixture
@@ -104,6 +115,13 @@ def test_errors_are_those_that_were_put_in(results: Results) -> None:
     assert len(correct) == 16
     assert row["hinge_accuracy_not_closed"] == correct.mean()
     assert 0 < correct.mean() < 1
+
+
+def test_standard_errors_are_those_of_validation_doors(results: Results) -> None:
+    errors = standard_errors(results, "pointnet2")
+    assert errors is not None
+    assert (errors.position_m, errors.yaw_deg) == pytest.approx((0.05, 1))
+    assert errors.angle_deg == pytest.approx({"closed": 4, "semi_open": 4, "open": 4})
 
 
 def test_presence_is_counted_by_kind(results: Results, scene_dataset: PreparedDataset) -> None:

@@ -150,6 +150,8 @@ def test_heads_are_trained_jointly_and_written_in_metres(
     tested = [sample for sample, role in scene_roles.items() if role == "test"]
     rows = read_csv(tmp_path / "head_outputs.csv")
     assert [row["sample_id"] for row in rows] == tested
+    validated = [sample for sample, role in scene_roles.items() if role == "val"]
+    assert [row["sample_id"] for row in read_csv(tmp_path / "validation_heads.csv")] == validated
     assert set(rows[0]) == {
         "sample_id",
         "p_door",

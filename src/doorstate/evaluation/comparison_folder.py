@@ -48,7 +48,8 @@ def read_run(run: RunFolder, method: str, fold: int) -> RunContents:
     """
     parts = [_with_head_outputs(_read_predictions(run.predictions), run.head_outputs).assign(role="test")]
     if run.validation.exists():
-        parts.append(_read_predictions(run.validation).assign(role="val"))
+        validation = _with_head_outputs(_read_predictions(run.validation), run.validation_heads)
+        parts.append(validation.assign(role="val"))
     config = read_json(run.config) if run.config.exists() else {}
     return RunContents(
         RunRecord(

@@ -10,9 +10,11 @@ import pandas as pd
 
 from doorstate.evaluation.manifest import number_values, text_values
 from doorstate.evaluation.results import KEY_COLUMNS, RULE_COLUMNS, Results, predicted_column
+from doorstate.networks.card import HeadErrors
 from doorstate.networks.heads import HEADS, POINT_HEADS, head_metrics
 from doorstate.types import DECISION_THRESHOLD, NO_DOOR, PARTS, STATES
 
+_ONE_SIGMA = 0.683  # share of a normal distribution within one standard deviation
 PART_NAMES = POINT_HEADS[PARTS].classes
 
 
@@ -45,6 +47,28 @@ def head_errors(rows: pd.DataFrame) -> dict[str, float]:
     truth = rows[sources].astype("object")
     records = truth.where(truth.notna(), None).to_dict("records")
     return head_metrics(outputs, [{str(name): value for name, value in row.items()} for row in records])
+
+
+def standard_errors(results: Results, method: str) -> HeadErrors | None:
+    """Return the errors that 68 % of the validation doors of a network do not exceed, the standard error of a normal
+    distribution; None without the heads `frame` and `angle` or their validation outputs.
+    """
+    own = results.joined
+    doors = own[(own["method"] == method) & (own["role"] == "val") & (own["state"] != NO_DOOR)]
+
+    def errors(name: str) -> pd.Series[float]:
+        return number_values(doors, predicted_column(name)) - number_values(doors, name)
+
+    yaw_deg = (errors("door_yaw_deg") + 180) % 360 - 180
+    position_m = np.hypot(errors("door_x_m"), errors("door_y_m"))
+    angle_deg = errors("opening_angle_deg").abs().groupby(doors["state"]).quantile(_ONE_SIGMA).dropna()
+    if position_m.isna().all() or angle_deg.empty:
+        return None
+    return HeadErrors(
+        position_m=round(float(position_m.quantile(_ONE_SIGMA)), 4),
+        yaw_deg=round(float(yaw_deg.abs().quantile(_ONE_SIGMA)), 3),
+        angle_deg={str(state): round(float(angle), 2) for state, angle in angle_deg.items()},
+    )
 
 
 def score_heads(results: Results) -> pd.DataFrame:

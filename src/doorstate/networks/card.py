@@ -22,7 +22,7 @@ _DIGEST = re.compile("sha256:[0-9a-f]{64}")
 
 
 class HeadErrors(FrozenModel):
-    """Standard errors of the heads on validation doors."""
+    """Standard errors of the heads on validation doors: 68 % of the errors are smaller."""
 
     position_m: float = Field(gt=0)  # of the opening's middle
     yaw_deg: float = Field(gt=0)

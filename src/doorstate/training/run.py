@@ -149,8 +149,11 @@ def evaluate_run(
         "val_samples": len(data.samples["val"]),
         "test_samples": len(data.samples["test"]),
     }
-    roles: tuple[tuple[Role, Path], ...] = (("val", run.validation), ("test", run.predictions))
-    for role, path in roles:
+    roles: tuple[tuple[Role, Path, Path], ...] = (
+        ("val", run.validation, run.validation_heads),
+        ("test", run.predictions, run.head_outputs),
+    )
+    for role, path, heads_path in roles:
         if not data.samples[role]:
             continue
         loader = data.loader(role, config.num_points)
@@ -159,9 +162,9 @@ def evaluate_run(
         samples = [name for name, has_state in zip(data.samples[role], mask, strict=True) if has_state]
         write_predictions(path, samples, outputs.labels[mask], outputs.probabilities[mask])
         metrics |= {f"{role}_macro_f1": outputs.macro_f1, f"{role}_accuracy": outputs.accuracy}
-        if role == "test" and outputs.head_values:
+        if outputs.head_values:
             columns = head_columns(outputs.head_values, loader.placement)
-            write_head_outputs(run.head_outputs, data.samples[role], columns)
+            write_head_outputs(heads_path, data.samples[role], columns)
         if role == "test" and outputs.part_counts is not None:
             metrics["test_part_counts"] = outputs.part_counts.tolist()
     return metrics

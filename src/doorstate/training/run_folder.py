@@ -34,6 +34,7 @@ class RunFolder:
         self.predictions = path / "predictions.csv"
         self.validation = path / "validation.csv"  # predictions for the samples that the epoch was chosen on
         self.head_outputs = path / "head_outputs.csv"  # of further heads, for all test samples
+        self.validation_heads = path / "validation_heads.csv"  # of further heads, for all validation samples
         self.detections = path / "detections.jsonl"  # of a rule, for the test samples that it got wrong
         self.metrics = path / "metrics.json"
 
