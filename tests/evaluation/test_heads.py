@@ -69,7 +69,9 @@ def write_comparison(dataset: PreparedDataset, folder: Path, wrong_hinges: int) 
         write_csv(run / "predictions.csv", _right_states(rows))
         validated = [row for row in dataset.rows if roles[row["sample_id"]] == "val"]
         write_csv(run / "validation.csv", _right_states(validated))
-        write_csv(run / "validation_heads.csv", [{"sample_id": row["sample_id"]} | _moved(row) for row in validated])
+        write_csv(
+            run / "validation_heads.csv", [{"sample_id": row["sample_id"]} | _moved(row) for row in validated]
+        )
         counts = np.zeros((6, 6), dtype=int)
         counts[:2, :2] = [[8, 2], [0, 10]]
         (run / "metrics.json").write_text(json.dumps({"test_part_counts": counts.tolist()}))
