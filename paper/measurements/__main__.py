@@ -81,7 +81,7 @@ def doorways(
 
     with progress_bar("doorways") as progress:
         doors, frames = measure_doorways(scenes, progress)
-    _write((doorways_table(doors, frames),), out / "doorways.md", scenes=scenes)
+    _write((doorways_table(doors, frames),), out / "doorway-candidates.md", scenes=scenes)
 
 
 @app.command()

@@ -17,7 +17,17 @@ from doorstate.inference.predictor import Predictor
 from doorstate.simulation.true_door import TrueDoor
 from doorstate.simulation.truth import true_doors
 
-from .doorways import NEAR_M, SEED, VISIBLE_PX, View, gap_to, nearest, simulated_views, visible_doors
+from .doorways import (
+    NEAR_M,
+    SEED,
+    SOURCES,
+    VISIBLE_PX,
+    View,
+    gap_to,
+    nearest,
+    simulated_views,
+    visible_doors,
+)
 from .words import count_words
 
 _EXACT_M = 0.1
@@ -84,7 +94,7 @@ def measure_doors(
     """
     doors: list[FoundDoor] = []
     frames: list[AnsweredFrame] = []
-    for view in simulated_views(scenes, progress, seed):
+    for view in simulated_views(SOURCES, scenes, progress, seed):
         prediction = predictor(view.frame.points, is_level=True)
         doors += (found_door(view, door, prediction) for door in visible_doors(view.row))
         frames.append(answered_frame(view, prediction))

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -12,18 +11,17 @@ from doorstate.evaluation.table import Table
 from doorstate.inference.door import Door
 from doorstate.inference.doorway_check import DoorwayCheck
 from doorstate.inference.gate import DEFAULT_GATE
-from doorstate.simulation.generate import simulate_rows
-from doorstate.simulation.presets import PRESETS, PresetName
 from doorstate.simulation.truth import TrueDoor, true_doors
 from doorstate.types import DoorState, Points
 
 from .dark_leaves import dark_leaf
+from .doorways import VISIBLE_PX, Source, simulated_views
+from .words import count_words
 
 _SEED = 77_001  # of no data set, and of no constant of the check
-SOURCES: tuple[tuple[PresetName, str], ...] = tuple(
+SOURCES: tuple[Source, ...] = tuple(
     (preset, sensor) for preset in ("varied", "cluttered") for sensor in ("xtion", "d435")
 )
-_VISIBLE_PX = 1500
 _LEAVES = {"full_glass": "glass", "glazed": "glazed", "sliding": "sliding"}  # others are opaque
 
 
@@ -46,17 +44,14 @@ def measure_doorway_gate(scenes: int, progress: Progress) -> list[CheckResult]:
         progress: called after each scene.
     """
     results = []
-    for number, (preset, sensor) in enumerate(SOURCES):
-        for index in range(scenes):
-            for row, frame in zip(*simulate_rows(PRESETS[preset], _SEED, index, sensor), strict=True):
-                door = true_doors(row)[0]
-                if door.visible_px.total < _VISIBLE_PX:
-                    continue
-                leaf = _LEAVES.get(door.kind, "opaque")
-                results.append(_result(preset, leaf, frame.points, door))
-                if leaf != "glass":
-                    results.append(_result(preset, f"dark {leaf}", dark_leaf(frame), door))
-            progress(number * scenes + index + 1, len(SOURCES) * scenes)
+    for preset, _, row, frame in simulated_views(SOURCES, scenes, progress, _SEED):
+        door = true_doors(row)[0]
+        if door.visible_px.total < VISIBLE_PX:
+            continue
+        leaf = _LEAVES.get(door.kind, "opaque")
+        results.append(_result(preset, leaf, frame.points, door))
+        if leaf != "glass":
+            results.append(_result(preset, f"dark {leaf}", dark_leaf(frame), door))
     return results
 
 
@@ -69,16 +64,16 @@ def doorway_gate_table(results: Sequence[CheckResult]) -> Table:
             for result in results
             if (result.preset, result.state, result.leaf) == (preset, state, leaf)
         ]
-        reasons = Counter(result.refused for result in part if result.refused)
+        reasons = [result.refused for result in part if result.refused]
         count = len(part)
         rows.append(
             (
                 preset,
                 state,
                 leaf,
-                ", ".join(f"{code} {number}" for code, number in reasons.most_common()) or "–",
+                count_words(reasons) or "–",
                 str(count),
-                f"{1 - reasons.total() / count:.2f}",
+                f"{1 - len(reasons) / count:.2f}",
                 f"{sum(result.is_open for result in part) / count:.2f}",
                 f"{sum(result.leaf_seen for result in part) / count:.2f}",
             )

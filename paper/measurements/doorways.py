@@ -23,7 +23,9 @@ from doorstate.simulation.row import Row
 from doorstate.simulation.truth import TrueDoor, true_doors
 
 SEED = 1_000_003  # of no data set
-SOURCES: tuple[tuple[PresetName, str], ...] = tuple(
+Source = tuple[PresetName, str]
+"""Preset and sensor of simulated frames."""
+SOURCES: tuple[Source, ...] = tuple(
     (preset, sensor)
     for preset in ("varied", "cluttered", "corridor", "two-doors", "no-door")
     for sensor in ("xtion", "d435")
@@ -78,19 +80,22 @@ class FrameResult(NamedTuple):
     milliseconds: float  # of one core
 
 
-def simulated_views(scenes: int, progress: Progress, seed: int = SEED) -> Iterator[View]:
-    """Yield the frames of all presets and sensors.
+def simulated_views(
+    sources: Sequence[Source], scenes: int, progress: Progress, seed: int = SEED
+) -> Iterator[View]:
+    """Yield the frames of presets and sensors.
 
     Args:
+        sources: presets and sensors.
         scenes: scenes of each preset and sensor.
         progress: called after each scene.
         seed: seed of the scenes.
     """
-    for number, (preset, sensor) in enumerate(SOURCES):
+    for number, (preset, sensor) in enumerate(sources):
         for index in range(scenes):
             for row, frame in zip(*simulate_rows(PRESETS[preset], seed, index, sensor), strict=True):
                 yield View(preset, sensor, row, frame)
-            progress(number * scenes + index + 1, len(SOURCES) * scenes)
+            progress(number * scenes + index + 1, len(sources) * scenes)
 
 
 def visible_doors(row: Row) -> list[TrueDoor]:
@@ -119,10 +124,15 @@ def nearest(door: TrueDoor, places: Iterable[AnyPlaced]) -> AnyPlaced | None:
 
 
 def measure_doorways(scenes: int, progress: Progress) -> tuple[list[DoorResult], list[FrameResult]]:
-    """Return the results of all visible doors and of all frames; arguments are those of `simulated_views`."""
+    """Return the results of all visible doors and of all frames.
+
+    Args:
+        scenes: scenes of each preset and sensor.
+        progress: called after each scene.
+    """
     doors: list[DoorResult] = []
     frames: list[FrameResult] = []
-    for preset, sensor, row, frame in simulated_views(scenes, progress):
+    for preset, sensor, row, frame in simulated_views(SOURCES, scenes, progress):
         cloud = remove_outliers(frame.points).points
         floor_m = find_floor_z_m(cloud)
         started = time.process_time()

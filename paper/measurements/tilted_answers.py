@@ -40,7 +40,7 @@ class TiltedAnswer(NamedTuple):
 def measure_tilted_answers(predictor: Predictor, progress: Progress) -> list[TiltedAnswer]:
     """Return the answers for all frames with all tilts, which the predictor is not told."""
     answers = []
-    frames = list(zip(gazebo_frames(), gazebo_heights_m(), strict=False))
+    frames = list(zip(gazebo_frames(), gazebo_heights_m(), strict=True))
     for number, ((state, level), height_m) in enumerate(frames):
         for (roll_deg, pitch_deg), is_height_known in product(TILTS, (False, True)):
             cloud = tilted(level, roll_deg, pitch_deg, None).points

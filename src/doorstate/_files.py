@@ -24,7 +24,7 @@ from doorstate._input import MAX_TABLE_BYTES, open_input
 from doorstate.errors import DatasetError, OutputError
 
 LOCK_PREFIX = ".doorstate"  # of the files that `_locks` keeps in a folder
-_BROKEN = "backslashreplace"  # for names of files that are not in UTF-8
+_NOT_UTF_8 = "backslashreplace"  # names of files may hold such bytes
 _SCRATCH = re.compile(rf"\.[0-9a-f]+\.tmp\..+|{re.escape(LOCK_PREFIX)}.*\.(lock|owner)")
 
 
@@ -109,13 +109,13 @@ def is_vacant(folder: Path) -> bool:
 def write_text(target: Path, text: str, durable: bool = True) -> None:
     """Write `text` as UTF-8, atomically; `durable` as in `atomic_path`."""
     with atomic_path(target, durable) as temporary:
-        temporary.write_text(text, encoding="utf-8", errors=_BROKEN)
+        temporary.write_text(text, encoding="utf-8", errors=_NOT_UTF_8)
 
 
 def write_compressed_text(target: Path, text: str) -> None:
     """Write `text` as UTF-8, compressed with gzip; the same text gives the same bytes."""
     with atomic_path(target) as temporary:
-        temporary.write_bytes(gzip.compress(text.encode("utf-8", _BROKEN), mtime=0))
+        temporary.write_bytes(gzip.compress(text.encode("utf-8", _NOT_UTF_8), mtime=0))
 
 
 def write_csv(path: Path, rows: Sequence[Mapping[str, str]]) -> None:

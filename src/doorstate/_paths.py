@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Names of files: those in tables stay inside the folder of their table, and none is obeyed by what shows it."""
+"""Names of files: those in tables stay inside its folder, and those in output are safe to show."""
 
 from __future__ import annotations
 
@@ -34,8 +34,9 @@ def check_encoding(name: str) -> None:
     """Check that a table can hold the name of a file.
 
     Raises:
-        CloudReadError: it is not in UTF-8; Python gives such bytes as single surrogates.
+        CloudReadError: it is not in UTF-8.
     """
+    # Python gives bytes that are not in UTF-8 as single surrogates.
     if not name.isascii() and any("\ud800" <= character <= "\udfff" for character in name):
         raise CloudReadError("its name is not in UTF-8", hint="rename it")
 

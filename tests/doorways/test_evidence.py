@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests of doorstate.doorways.evidence and of the sweep of leaves."""
+"""Tests of doorstate.doorways.evidence."""
 
 from __future__ import annotations
 
@@ -9,10 +9,8 @@ import numpy as np
 import pytest
 
 from doorstate.doorways.doorway import Doorway
-from doorstate.doorways.evidence import _pooled, find_evidence
-from doorstate.doorways.expected_lines import row_density
+from doorstate.doorways.evidence import find_evidence
 from doorstate.doorways.finder import thinned
-from doorstate.doorways.leaf_sweep import SEMI_OPEN_ANGLES_DEG, _counts, _widened, sweep_leaf
 from doorstate.doorways.measured_view import MeasuredView
 from tests.doorways import scenes
 from tests.doorways.scenes import HandMade
@@ -53,17 +51,8 @@ def test_the_order_of_the_points_does_not_matter() -> None:
     shuffled = np.random.default_rng(0).permutation(points)
     first, second = (find_evidence(MeasuredView(cloud), doorway) for cloud in (points, shuffled))
     # Means of float32 depths, and samples for the ranges, depend on the order.
-    for name in (
-        "in_view",
-        "on_wall",
-        "through",
-        "hidden",
-        "missing",
-        "flush",
-        "rim_m",
-        "hole_m",
-        "nearest_m",
-    ):
+    shares = ("in_view", "on_wall", "through", "hidden", "missing", "flush")
+    for name in (*shares, "rim_m", "hole_m", "nearest_m"):
         assert getattr(second, name) == pytest.approx(getattr(first, name), abs=0.05, nan_ok=True)
     assert second.has_floor_before == first.has_floor_before
 
@@ -82,73 +71,3 @@ def test_a_wall_without_points_has_nothing_in_view() -> None:
     evidence = find_evidence(MeasuredView(np.array([[1.0, 9.0, 0.0]], np.float32)), doorway)
     assert (evidence.in_view, evidence.missing) == (0.0, 0.0)
     assert np.isnan(evidence.rim_m)
-
-
-def _leaf(angle_deg: float, doorway: Doorway, beyond_m: float = 0.0, top_m: float = 2.0) -> np.ndarray:
-    """Return points on a leaf that opens away from the camera about the left end, and on a wall behind it."""
-    along, up = np.meshgrid(np.arange(0.02, doorway.width_m + beyond_m, 0.02), np.arange(0.02, top_m, 0.04))
-    turn = np.radians(angle_deg)
-    x = doorway.width_m / 2 - along * np.cos(turn)
-    leaf = np.stack([x, -along * np.sin(turn), up], axis=-1).reshape(-1, 3)
-    wall = np.stack(
-        np.broadcast_arrays(np.arange(-3, 3, 0.04)[:, None], -3.0, np.arange(0, 2.4, 0.04)), axis=-1
-    ).reshape(-1, 3)
-    return doorway.to_sensor(np.concatenate([leaf, wall]).astype(np.float32))
-
-
-@pytest.mark.parametrize("angle_deg", [70.0, 90.0, 110.0])
-def test_a_leaf_is_found_at_its_angle(angle_deg: float) -> None:
-    doorway = Doorway(2.5, -0.4, 90.0, 0.9, -1.0)
-    leaf = sweep_leaf(MeasuredView(_leaf(angle_deg, doorway)), doorway)
-    assert leaf is not None
-    assert (leaf.hinge, leaf.swing, leaf.width_m) == ("left", "away", 0.9)
-    assert leaf.angle_deg == pytest.approx(angle_deg, abs=5)
-    assert leaf.share > 0.9
-
-
-def test_a_leaf_that_is_half_open_is_none_of_an_open_door() -> None:
-    doorway = Doorway(2.5, -0.4, 90.0, 0.9, -1.0)
-    assert sweep_leaf(MeasuredView(_leaf(40.0, doorway)), doorway) is None
-    half_open = sweep_leaf(MeasuredView(_leaf(40.0, doorway)), doorway, SEMI_OPEN_ANGLES_DEG)
-    assert half_open is not None
-    assert half_open.angle_deg == pytest.approx(40, abs=5)
-
-
-def test_a_wall_that_goes_on_is_no_leaf() -> None:
-    doorway = Doorway(2.5, -0.4, 90.0, 0.9, -1.0)
-    assert sweep_leaf(MeasuredView(_leaf(90.0, doorway, beyond_m=1.0)), doorway) is None
-    assert sweep_leaf(MeasuredView(_leaf(90.0, doorway, top_m=2.5)), doorway) is None
-
-
-@pytest.mark.parametrize("pool", [1, 2, 3])
-def test_pooled_cells_equal_sums_of_padded_blocks(pool: int) -> None:
-    for shape in ((1, 1), (7, 5), (9, 6), (8, 19)):
-        cells = np.random.default_rng(0).integers(0, 9, shape).astype(np.float64)
-        columns, rows = (-(-size // pool) for size in shape)
-        padded = np.pad(cells, ((0, columns * pool - shape[0]), (0, rows * pool - shape[1])))
-        plain = padded.reshape(columns, pool, rows, pool).sum(axis=(1, 3))
-        assert (_pooled(cells, pool) == plain).all()
-        assert (_pooled(np.stack([cells, 2 * cells]), pool) == np.stack([plain, 2 * plain])).all()
-
-
-def test_density_of_rows_equals_a_loop() -> None:
-    rim = np.random.default_rng(0).poisson(0.4, (11, 19)).astype(np.float64)
-    density = row_density(rim)
-    for row in range(19):
-        rows = [max(0, row - 1), row, min(18, row + 1)]
-        about = [sum(column[rows]) / 3 for column in rim]
-        filled = [value for value in about if value > 0]
-        assert density[row] == pytest.approx(sum(filled) / len(filled) if len(filled) >= 2 else 0)
-
-
-def test_cells_of_a_leaf_are_counted_by_part() -> None:
-    rng = np.random.default_rng(0)
-    cells, parts = rng.random((2, 2, 7, 10, 8)) < 0.5, rng.random((3, 10, 8)) < 0.4
-    plain = [(cells & part).sum(axis=(-2, -1)) for part in parts]
-    assert (_counts(cells, parts) == np.stack(plain)).all()
-
-
-def test_walls_take_the_angles_beside_them() -> None:
-    is_wall = np.random.default_rng(0).random((2, 2, 24)) < 0.1
-    windows = np.lib.stride_tricks.sliding_window_view(np.pad(is_wall, ((0, 0), (0, 0), (2, 2))), 5, axis=-1)
-    assert (_widened(is_wall) == windows.any(axis=-1)).all()

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 from paper.answers import gazebo_frames, gazebo_heights_m
-from paper.measurements import doorways, tilted_answers
+from paper.measurements import doors as doors_measurement
+from paper.measurements import tilted_answers
 from paper.measurements.__main__ import app
 from paper.measurements.doors import (
     AnsweredFrame,
@@ -104,7 +105,7 @@ def _always_closed(count: int) -> DoorwayPredictor:
 
 
 def test_frames_are_answered_by_preset_and_sensor(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(doorways, "SOURCES", (("varied", "none"), ("no-door", "none")))
+    monkeypatch.setattr(doors_measurement, "SOURCES", (("varied", "none"), ("no-door", "none")))
     doors, frames = measure_doors(_always_closed(40), 1, no_progress, seed=2)
     assert [(door.state, door.predicted) for door in doors] == [(str(state), "closed") for state in STATES]
     assert [frame.preset for frame in frames] == ["varied"] * 3 + ["no-door"]

@@ -8,29 +8,25 @@ that far or grazing walls, and rows out of view, are no holes.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from doorstate.doorways.cell_shares import cell_shares
 from doorstate.doorways.doorway import Doorway
 from doorstate.doorways.elevation import ROW_M, Elevation, wall_elevation
-from doorstate.doorways.expected_lines import expected_lines
+from doorstate.doorways.expected_lines import Cells, expected_lines
 from doorstate.doorways.measured_view import MeasuredView
-from doorstate.doorways.opening_surfaces import Cells, floor_behind_share, is_across, is_flush
+from doorstate.doorways.opening_surfaces import floor_behind_share, is_across, is_flush
 from doorstate.doorways.plan_lines import Floats, Line
 from doorstate.doorways.walls import Wall
 
 _RIM_M = 0.6  # stretch of wall on each side
 _EDGE_M = 0.1  # of the opening, which its frame may hide
 _ROWS = slice(round(0.1 / ROW_M), round(2.0 / ROW_M))  # above thresholds, below lintels
-_POOLS = (1, 2, 3)  # cells that are taken together, in both directions, where points are few
-_MIN_FILLED = 0.9  # of the cells of each rim: seen along the wall, whole columns lie between two sight lines
-_MIN_EXPECTED = 6.0  # sight lines of a cell: one in 400 such cells is empty by chance
 _BEFORE_M = (0.1, 1.0)  # floor before an opening
 _FLOOR_M = 0.1  # of a point to the height of the floor
 _MIN_FLOOR_POINTS = 8
@@ -46,7 +42,7 @@ class DoorwayEvidence:
         through: share through which something farther behind was measured.
         hidden: share before which something stands.
         missing: share from which nothing came back.
-        about: cells about the opening.
+        cells: cells of the wall about the opening, from which all else is computed.
     """
 
     in_view: float
@@ -54,7 +50,7 @@ class DoorwayEvidence:
     through: float
     hidden: float
     missing: float
-    about: _About
+    cells: OpeningCells
 
     @cached_property
     def flush(self) -> float:
@@ -74,76 +70,76 @@ class DoorwayEvidence:
     @cached_property
     def floor_behind(self) -> float:
         """Share of the sight lines expected on the floor behind that ended behind; NaN if too few are expected."""
-        about = self.about
+        cells = self.cells
         # Other surfaces, as of a leaf in the opening, neither show the floor behind nor exclude it.
-        is_other = (self._has_surface & ~self._is_flush) | (about.lines[2] > 0)
-        along_m, distance_m = about.along_m, about.wall.distance_m
+        is_other = (self._has_surface & ~self._is_flush) | (cells.lines[2] > 0)
+        along_m, distance_m = cells.along_m, cells.wall.distance_m
         return floor_behind_share(
-            about.lines[1],
-            np.where(is_other, 0.0, about.expected * about.in_view),
+            cells.lines[1],
+            np.where(is_other, 0.0, cells.expected * cells.in_view),
             np.stack([np.hypot(along_m, distance_m), np.full(len(along_m), distance_m)], axis=1),
             np.linspace(_ROWS.start + 0.5, _ROWS.stop - 0.5, _ROWS.stop - _ROWS.start) * ROW_M,
-            -about.doorway.floor_z_m,
+            -cells.doorway.floor_z_m,
             self.farthest_m,
         )
 
     @cached_property
     def rim_m(self) -> float:
         """Median range of the wall beside the opening; NaN if none was measured."""
-        right, left = self.about.rims
+        right, left = self.cells.rims
         return _median(self._ranges_m[right | left])
 
     @cached_property
     def hole_m(self) -> float:
-        """Least range of what surrounds the missing cells; NaN if none are missing."""
-        return _hole_range_m(self.about.is_missing, self._ranges_m)
+        """Lower quartile of the ranges of the cells beside missing ones; NaN if none are missing."""
+        return _hole_range_m(self.cells.is_missing, self._ranges_m)
 
     @property
     def nearest_m(self) -> float:
         """Least range in the cloud."""
-        return self.about.view.range_limits_m[0]
+        return self.cells.view.range_limits_m[0]
 
     @property
     def farthest_m(self) -> float:
         """Largest range in the cloud."""
-        return self.about.view.range_limits_m[1]
+        return self.cells.view.range_limits_m[1]
 
     @cached_property
     def has_floor_before(self) -> bool:
         """True if the floor before the opening was measured."""
-        return _has_floor_before(self.about.view.points, self.about.doorway)
+        return _has_floor_before(self.cells.view.points, self.cells.doorway)
 
     @cached_property
     def _relief_m(self) -> Cells:
-        about = self.about
+        cells = self.cells
         relief_m: Cells = np.where(
-            about.lines[0] > 0, about.elevation.relief_m[about.stretch, _ROWS], np.nan
+            cells.lines[0] > 0, cells.elevation.relief_m[cells.stretch, _ROWS], np.nan
         ).astype(np.float64)
         return relief_m
 
     @cached_property
     def _has_surface(self) -> NDArray[np.bool_]:
-        has_surface: NDArray[np.bool_] = (self.about.in_view > 0) & np.isfinite(self._relief_m)
+        has_surface: NDArray[np.bool_] = (self.cells.in_view > 0) & np.isfinite(self._relief_m)
         return has_surface
 
     @cached_property
     def _is_across(self) -> NDArray[np.bool_]:
-        about, half_m = self.about, self.about.doorway.width_m / 2
-        ends_m = about.middle_m - half_m, about.middle_m + half_m
-        return is_across(about.along_m, self._relief_m, about.wall.distance_m, ends_m)
+        cells, half_m = self.cells, self.cells.doorway.width_m / 2
+        ends_m = cells.middle_m - half_m, cells.middle_m + half_m
+        return is_across(cells.along_m, self._relief_m, cells.wall.distance_m, ends_m)
 
     @cached_property
     def _is_flush(self) -> NDArray[np.bool_]:
         relief_m = np.where(self._is_across, np.nan, self._relief_m)
-        return is_flush(relief_m, self.about.in_view, self.about.rims)
+        return is_flush(relief_m, self.cells.in_view, self.cells.rims)
 
     @cached_property
     def _ranges_m(self) -> Cells:
-        about = self.about
-        return _ranges_m(about.elevation, about.wall, about.doorway.floor_z_m)[about.stretch, _ROWS]
+        cells = self.cells
+        return _ranges_m(cells.elevation, cells.wall, cells.doorway.floor_z_m)[cells.stretch, _ROWS]
 
 
-class _About(NamedTuple):
+class OpeningCells(NamedTuple):
     """Cells (columns, rows) of the wall about an opening."""
 
     view: MeasuredView
@@ -182,12 +178,12 @@ def find_evidence(view: MeasuredView, doorway: Doorway) -> DoorwayEvidence:
     kinds = np.stack([elevation.on_wall, elevation.through, elevation.hidden])[:, stretch, _ROWS]
     lines: Cells = kinds.astype(np.float64)
     in_view, expected = expected_lines(lines.sum(axis=0), opening, rims)
-    shares, is_missing = _shares(lines, expected, in_view, rims)
+    shares, is_missing = cell_shares(lines, expected, in_view, rims)
     share_in_view = float(in_view[opening].mean()) if opening.any() else 0.0
-    about = _About(
+    cells = OpeningCells(
         view, doorway, wall, middle_m, elevation, stretch, lines, rims, in_view, expected, is_missing
     )
-    return DoorwayEvidence(share_in_view, *shares, about)
+    return DoorwayEvidence(share_in_view, *shares, cells)
 
 
 def _wall_of(doorway: Doorway) -> tuple[Wall, float]:
@@ -217,54 +213,8 @@ def _ranges_m(elevation: Elevation, wall: Wall, floor_z_m: float) -> Cells:
     return ranges_m
 
 
-def _shares(
-    kinds: Cells, expected: Cells, in_view: Cells, rims: Sequence[NDArray[np.bool_]]
-) -> tuple[tuple[float, float, float, float], NDArray[np.bool_]]:
-    """Return the shares on the wall, through, hidden and missing, and the missing cells (columns, rows)."""
-    is_missing = np.zeros(in_view.shape, dtype=bool)
-    if in_view.sum() == 0:
-        return (0.0, 0.0, 0.0, 0.0), is_missing
-    seen = kinds.sum(axis=0)
-    beside = [seen[rim][:, in_view.any(axis=0)] for rim in rims]
-    for pool in _POOLS:
-        lines, cells = _pooled(np.stack([expected * in_view, in_view]), pool)
-        is_in_view = cells >= 0.5 * pool**2
-        counted = is_in_view & (lines >= _MIN_EXPECTED)
-        is_enough = counted.any() and np.count_nonzero(counted) >= 0.5 * np.count_nonzero(is_in_view)
-        if is_enough and all(_filled_share(rim, pool) >= _MIN_FILLED for rim in beside):
-            break
-    else:
-        counted = cells > 0  # too few points to tell a hole from chance in each cell
-    pooled = _pooled(kinds * in_view, pool)
-    totals = pooled.sum(axis=0)
-    empty = counted & (totals == 0)
-    filled = counted & (totals > 0)
-    weights = cells / cells[counted].sum()
-    parts = [float((part / np.maximum(totals, 1) * weights)[filled].sum()) for part in pooled]
-    wide = empty.repeat(pool, axis=0).repeat(pool, axis=1)[: seen.shape[0], : seen.shape[1]]
-    return (parts[0], parts[1], parts[2], float(weights[empty].sum())), wide & (in_view > 0) & (seen == 0)
-
-
-def _filled_share(seen: Cells, pool: int) -> float:
-    """Return the share of the pooled cells of a rim that were measured; 1 where none were, as out of view."""
-    filled = _pooled(seen, pool) > 0
-    return float(filled.mean()) if filled.any() else 1.0
-
-
-def _pooled(cells: Cells, pool: int) -> Cells:
-    """Return the sums of blocks of cells (..., columns, rows)."""
-    if pool == 1:
-        return cells
-    columns, rows = (-(-size // pool) for size in cells.shape[-2:])
-    sums = np.zeros((*cells.shape[:-2], columns, rows))
-    for i, j in product(range(pool), repeat=2):
-        part = cells[..., i::pool, j::pool]
-        sums[..., : part.shape[-2], : part.shape[-1]] += part
-    return sums
-
-
 def _hole_range_m(is_missing: NDArray[np.bool_], ranges_m: Cells) -> float:
-    """Return the median of the nearer half of the ranges of the cells beside missing ones."""
+    """Return the lower quartile of the ranges of the cells beside missing ones."""
     if not is_missing.any():
         return math.nan
     padded = np.pad(is_missing, 1)

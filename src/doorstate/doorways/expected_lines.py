@@ -8,7 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from doorstate.doorways.opening_surfaces import Cells
+Cells = NDArray[np.float64]
+
+MIN_LINES = 6.0  # expected in a cell or place: one in 400 such places is empty by chance
 
 
 def expected_lines(
@@ -21,18 +23,18 @@ def expected_lines(
     """
     right, left = (row_density(seen[rim]) for rim in rims)
     share = np.linspace(0, 1, int(opening.sum()))[:, None]  # from the right rim to the left one
-    both = (right > 0) & (left > 0)
-    one = np.maximum(right, left)
-    floor = 1e-9
-    between = np.maximum(right, floor) ** (1 - share) * np.maximum(left, floor) ** share
+    has_both = (right > 0) & (left > 0)
+    larger = np.maximum(right, left)
+    least = 1e-9  # of a power
+    between = np.maximum(right, least) ** (1 - share) * np.maximum(left, least) ** share
     filled = seen[opening] > 0
     from_right = np.cumsum(filled[::-1], axis=0)[::-1] > 0  # up to the outermost seen cell
     from_left = np.cumsum(filled, axis=0) > 0
-    up_to = np.where(right > 0, from_right, from_left) & (one > 0)
-    expected = np.where(both, between, np.broadcast_to(one, between.shape))
+    up_to = np.where(right > 0, from_right, from_left) & (larger > 0)
+    expected = np.where(has_both, between, np.broadcast_to(larger, between.shape))
     shape = seen.shape
     in_view, all_expected = np.zeros(shape, dtype=bool), np.zeros(shape)
-    in_view[opening] = np.where(both, True, up_to)
+    in_view[opening] = has_both | up_to
     all_expected[opening] = expected
     return in_view.astype(np.float64), all_expected
 

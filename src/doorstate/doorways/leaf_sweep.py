@@ -30,39 +30,34 @@ _BESIDE = 2  # angles on each side of that of a wall
 _WALL_M = (-0.25, 0.15)  # beside the opening: the wall itself, which a leaf folded back lies on
 MIN_WIDTH_M = 0.55  # of one leaf of double doors
 _MIN_CELLS = 10  # of the leaf, in view
+_MIN_SHARE = 0.7  # of the cells of a leaf in view that were measured
 _OUTER, _MIN_OUTER_CELLS = 4, 5  # outer steps of the leaf, and least cells in view there: reveals have none
 
 
 class SeenLeaf(NamedTuple):
     """Surface where the leaf of a door would be."""
 
-    share: float  # of its cells in view that were measured, and of its outer half at least
+    share: float  # of its cells in view that were measured; that of its outer half if it is smaller
     angle_deg: float
     hinge: Hinge
     swing: Literal["away", "towards"]
     width_m: float
 
 
-def sweep_leaf(
-    view: MeasuredView,
-    doorway: Doorway,
-    angles_deg: Angles = OPEN_ANGLES_DEG,
-    min_share: float = 0.7,
-) -> SeenLeaf | None:
+def sweep_leaf(view: MeasuredView, doorway: Doorway, angles_deg: Angles = OPEN_ANGLES_DEG) -> SeenLeaf | None:
     """Return the leaf of which most was measured, or None if no leaf was.
 
     Args:
         view: points of the cloud.
         doorway: pose and width of the opening.
         angles_deg: opening angles to look at.
-        min_share: least share of the cells of a leaf in view that were measured.
     """
     widths_m = [doorway.width_m] + [doorway.width_m / 2] * (doorway.width_m >= 2 * MIN_WIDTH_M)
     occupied = _occupied(view, doorway)
     best: SeenLeaf | None = None
     for width_m in widths_m:
         leaf = _best_leaf(doorway, width_m, np.asarray(angles_deg), occupied, view.reach)
-        if leaf is not None and leaf.share >= min_share and (best is None or leaf.share > best.share):
+        if leaf is not None and leaf.share >= _MIN_SHARE and (best is None or leaf.share > best.share):
             best = leaf
     return best
 
@@ -117,7 +112,7 @@ def _middle(shares: NDArray[np.float64], first: int) -> int:
 
 
 def _widened(is_wall: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return the walls (..., angle) and the angles beside them, at which a leaf would still lie on the wall."""
+    """Return the angles (..., angle) of walls and those beside them, at which a leaf would still lie on the wall."""
     widened = is_wall.copy()
     for step in range(1, _BESIDE + 1):
         widened[..., step:] |= is_wall[..., :-step]
@@ -132,6 +127,7 @@ def _counts(cells: NDArray[np.bool_], parts: NDArray[np.bool_]) -> NDArray[np.fl
 
 
 def _half_m(doorway: Doorway) -> tuple[float, float]:
+    """Return half of the sides, along the wall and across it, of the rectangle that leaves can reach."""
     return 1.5 * doorway.width_m + 0.4, doorway.width_m + 0.4
 
 

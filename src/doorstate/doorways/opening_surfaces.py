@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from doorstate.doorways.elevation import RELIEF_M
+from doorstate.doorways.expected_lines import MIN_LINES, Cells
 from doorstate.doorways.plan_lines import Floats
-
-Cells = NDArray[np.float64]
 
 # Largest difference between the depth of a flush cell and the median depth of the opening: at least the first, at most
 # the second, and between them three times the scatter of the wall on both sides.
@@ -21,7 +20,6 @@ _SCATTERS = 3.0
 _ACROSS_M = 0.08  # of where a sight line ends to the end of the opening
 _BEHIND_M = RELIEF_M + 0.05  # floor so far behind the wall is no threshold
 _IN_RANGE = 0.95  # of the largest range
-_MIN_LINES = 6.0  # expected: one in 400 such places is empty by chance
 
 
 def is_across(
@@ -81,7 +79,7 @@ def floor_behind_share(
     is_floor = (heights_m < camera_m) & (behind_m > _BEHIND_M) & (ranges_m < _IN_RANGE * farthest_m)
     total = float(expected[is_floor].sum())
     is_counted = is_floor & (expected > 0)
-    return min(1.0, float(through[is_counted].sum()) / total) if total >= _MIN_LINES else math.nan
+    return min(1.0, float(through[is_counted].sum()) / total) if total >= MIN_LINES else math.nan
 
 
 def _scatter_m(relief_m: Cells) -> float:

@@ -99,6 +99,7 @@ def strongest_line(
 
 def fit_line(points: Floats, weights: Floats | None = None) -> Line:
     """Return the line with least squared distances to (N, 2) points."""
+    # np.average and np.cov give the same bits, but check their arguments for longer than these few points take.
     weights = np.ones(len(points)) if weights is None else weights
     total = weights.sum()
     centre = (points * weights[:, None]).sum(axis=0) / total

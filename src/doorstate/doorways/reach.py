@@ -51,7 +51,7 @@ class Reach(NamedTuple):
 
 
 def _cells(tangents: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return the place of tangents of sight lines in the cells, of which the fraction is not cut."""
+    """Return the fractional cell numbers of tangents of sight lines."""
     cells: NDArray[np.float32] = (tangents + np.float32(_MAX_TAN)) / np.float32(_RAY_TAN)
     return cells
 

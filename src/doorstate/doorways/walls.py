@@ -153,13 +153,13 @@ def _refined(line: Line, plan: Floats) -> Line:
         return line
     behind_m = behind_m[near]
     along_m = line.direction @ (plan[:, near] - line.centre[:, None])
-    s, d = _columns(along_m, behind_m)
-    if len(s) < 3:
+    middles_m, depths_m = _columns(along_m, behind_m)
+    if len(middles_m) < 3:
         return line
-    best = _best_columns(s, d)
+    best = _best_columns(middles_m, depths_m)
     if best is None:
         return line
-    return _fit(line.centre + s[best, None] * line.direction + d[best, None] * line.normal)
+    return _fit(line.centre + middles_m[best, None] * line.direction + depths_m[best, None] * line.normal)
 
 
 def _columns(along_m: Floats, behind_m: Floats) -> tuple[Floats, Floats]:
@@ -177,17 +177,18 @@ def _columns(along_m: Floats, behind_m: Floats) -> tuple[Floats, Floats]:
     return middles_m, behind_m[order[starts + sizes // 2]]
 
 
-def _best_columns(s: Floats, d: Floats) -> NDArray[np.bool_] | None:
+def _best_columns(along_m: Floats, depths_m: Floats) -> NDArray[np.bool_] | None:
     """Return the columns near the line through two of them that most are near to; None if all such lines turn."""
-    first, second = _pairs(len(s))
-    slopes = (d[second] - d[first]) / (s[second] - s[first])
+    first, second = _pairs(len(along_m))
+    slopes = (depths_m[second] - depths_m[first]) / (along_m[second] - along_m[first])
     flat = np.flatnonzero(np.abs(slopes) <= math.tan(math.radians(_MAX_TURN_DEG)))
     if len(flat) == 0:
         return None
     first, slopes = first[flat], slopes[flat]
-    starts_m = d[first] - slopes * s[first]
-    gains = np.multiply.outer(slopes, s)
-    np.subtract(d, gains, out=gains)
+    starts_m = depths_m[first] - slopes * along_m[first]
+    # In place: the arrays are as large as the caches of a processor.
+    gains = np.multiply.outer(slopes, along_m)
+    np.subtract(depths_m, gains, out=gains)
     gains -= starts_m[:, None]
     gains /= _INLIER_M
     np.square(gains, out=gains)

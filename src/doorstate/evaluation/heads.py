@@ -50,8 +50,10 @@ def head_errors(rows: pd.DataFrame) -> dict[str, float]:
 
 
 def standard_errors(results: Results, method: str) -> HeadErrors | None:
-    """Return the errors that 68 % of the validation doors of a network do not exceed, the standard error of a normal
-    distribution; None without the heads `frame` and `angle` or their validation outputs.
+    """Return the standard errors of a network's heads: 68 % of the validation doors have smaller ones.
+
+    Returns:
+        None without the heads `frame` and `angle`, or without their outputs for validation doors.
     """
     own = results.joined
     doors = own[(own["method"] == method) & (own["role"] == "val") & (own["state"] != NO_DOOR)]
@@ -60,7 +62,7 @@ def standard_errors(results: Results, method: str) -> HeadErrors | None:
         return number_values(doors, predicted_column(name)) - number_values(doors, name)
 
     yaw_deg = (errors("door_yaw_deg") + 180) % 360 - 180
-    position_m = np.hypot(errors("door_x_m"), errors("door_y_m"))
+    position_m = pd.Series(np.hypot(errors("door_x_m"), errors("door_y_m")))
     angle_deg = errors("opening_angle_deg").abs().groupby(doors["state"]).quantile(_ONE_SIGMA).dropna()
     if position_m.isna().all() or angle_deg.empty:
         return None

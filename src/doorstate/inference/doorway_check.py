@@ -25,20 +25,19 @@ from doorstate.types import DoorState, Points
 _MAX_POINTS = 12_000  # of a cloud: eight for each cell of a door 2.5 m away
 _MIN_IN_VIEW = 0.06  # of an opening
 _MIN_SURFACE = 0.25  # of a closed door
+_MOSTLY_FLUSH = 0.8  # of the surface of an opening: of a closed leaf
 _MIN_PART = 0.15  # of a leaf that is pushed aside, as of sliding doors
 _MIN_THROUGH = 0.1
 _MAX_HIDDEN = 0.6
 _FILLED = 0.75  # of what nothing hides of an opening, by a surface along the wall
 _BLOCKED = 0.5  # of an opening by surfaces, where nothing else confirms that it is open
 _MIN_FILLED = 0.1  # of an opening, of which at least half is in view
-_MAX_FLUSH, _MIN_FREE = (
-    0.5,
-    0.2,
-)  # of what nothing hides of an opening beside a leaf, by a surface along the wall
+_MAX_FLUSH = 0.5  # of what nothing hides of an opening beside a leaf, by a surface along the wall
+_MIN_FREE = 0.2  # of an opening, that counts for it
 _CROSSED = 0.05  # of an opening that is not closed
 _RETURNED = 0.95  # of the rays to the floor behind an opening: few come back from a dark leaf
 _MIN_OPEN_DEG = 65.0  # doors are called open from 75 degrees on, semi-open up to 65
-_LEAF, _WHOLE_LEAF = 0.7, 0.95  # of the cells of a leaf in view: of an opening that is crossed, and of others
+_WHOLE_LEAF = 0.95  # of the cells in view of a leaf of an opening that nothing crosses
 _MIN_SEEN_FLOOR = 0.9  # of the rays to it
 _NO_FLOOR = 0.2  # of the sight lines expected on the floor behind an opening
 _CLEAR, _MAX_LOST = 0.9, 0.05  # of what nothing hides of an opening, and missing of all of it
@@ -126,7 +125,7 @@ def _check_closed(case: _Case) -> DoorwayCheck:
 def _check_semi_open(case: _Case) -> DoorwayCheck:
     """Require a leaf, or a surface that is not flush with the wall or leaves a part of the opening free."""
     evidence = case.evidence
-    is_askew = evidence.on_wall >= _MIN_SURFACE and evidence.flush < 0.8 * evidence.on_wall
+    is_askew = evidence.on_wall >= _MIN_SURFACE and evidence.flush < _MOSTLY_FLUSH * evidence.on_wall
     is_aside = evidence.flush >= _MIN_PART and evidence.through >= _MIN_THROUGH
     is_missing = evidence.missing > case.limits.max_missing_share
     if (is_askew or is_aside) and not is_missing:
@@ -155,7 +154,7 @@ def _check_open(case: _Case) -> DoorwayCheck:
 
 def _open_leaf(case: _Case) -> SeenLeaf | None:
     """Return the surface that has the place and the shape of an open leaf, or None."""
-    leaf = sweep_leaf(case.view, case.doorway, min_share=_LEAF)
+    leaf = sweep_leaf(case.view, case.doorway)
     angle_deg = None if leaf is None else find_leaf_angle_deg(case.view, case.doorway, leaf)
     return None if leaf is None or angle_deg is None or angle_deg < _MIN_OPEN_DEG else leaf
 
@@ -176,11 +175,14 @@ def _half(case: _Case, hinge: Hinge) -> _Case:
 def _check_passage(case: _Case, leaf: SeenLeaf | None) -> DoorwayCheck:
     evidence, passes, rays = case.evidence, case.passes, case.floor_rays
     # A sliding leaf behind a thick wall lies so far behind its face that rays seem to pass.
-    if _is_filled(evidence) and not evidence.floor_behind >= case.limits.min_floor_share:
+    has_floor_behind = (
+        evidence.floor_behind >= case.limits.min_floor_share
+    )  # not if too few lines are expected
+    if _is_filled(evidence) and not has_floor_behind:
         return DoorwayCheck(Abstention("opening_blocked", {"share": evidence.flush}))
     # Furniture before a closed or dark leaf may look like a part of a leaf; nothing passes it.
     is_crossed = passes or evidence.through >= _CROSSED or (rays is not None and rays.seen >= _RETURNED)
-    is_leaf = leaf is not None and leaf.share >= (_LEAF if is_crossed else _WHOLE_LEAF)
+    is_leaf = leaf is not None and (is_crossed or leaf.share >= _WHOLE_LEAF)
     if is_leaf and evidence.flush <= _MAX_FLUSH * max(evidence.free, _MIN_FREE):
         return DoorwayCheck(None, leaf_seen=True)
     hidden = _hidden(evidence, _MAX_HIDDEN)

@@ -34,8 +34,6 @@ from doorstate.inference.tilt import Tilt
 from doorstate.types import Points
 
 MAX_DOORS = 8  # of a cloud
-
-
 _SAMPLE_POINTS = 16_384  # of a cloud, to check its units
 
 

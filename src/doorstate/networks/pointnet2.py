@@ -95,7 +95,7 @@ class PointNet2(PointNetwork):
         batchnorm_eps: epsilon of every batch normalisation; 1e-3 in the original.
 
     Raises:
-        ConfigError: unknown variant, or no numbers of centres.
+        ConfigError: unknown variant, or not two numbers of centres.
     """
 
     feature_size = 1024
@@ -116,7 +116,9 @@ class PointNet2(PointNetwork):
         if variant not in VARIANTS:
             raise unknown_name("pointnet2 variant", variant, VARIANTS)
         if len(centres) != len(radii) or min(centres) < 1:
-            raise ConfigError("no numbers of two levels", field="centres", expected="two of at least 1")
+            raise ConfigError(
+                f"cannot use {centres}", field="centres", expected="two whole numbers of at least 1"
+            )
         levels, dropout = VARIANTS[variant]
         first, second = (
             [scale._replace(num_samples=num_samples or scale.num_samples) for scale in level]

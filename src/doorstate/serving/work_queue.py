@@ -38,7 +38,7 @@ class WorkQueue:
         self._quick = Lane([Worker(load, limits) for _ in range(limits.workers)], limits.queue)
         self._large = Lane([Worker(load, limits, LOW_PRIORITY)], max(1, limits.queue // 8))
         self.problem = ""
-        """Reason why the last file could not be predicted, whatever the file; empty while the workers do their work."""
+        """Fault of the service at the last file, whatever the file; empty if there was none."""
 
     async def wait_for_space(self, client: str, size: int, suffix: str | None) -> None:
         """Wait until a file may be received.

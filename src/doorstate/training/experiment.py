@@ -37,9 +37,8 @@ class Experiment(FrozenModel):
     recipe_changes: dict[str, Any] = Field(default_factory=dict)  # fields of the recipe
     # By network; these win over `recipe_changes`.
     network_changes: dict[str, dict[str, Any]] = Field(default_factory=dict)
-    network_options: dict[str, dict[str, Any]] = Field(
-        default_factory=dict
-    )  # of the class of a network, by name
+    # By network: arguments of its class.
+    network_options: dict[str, dict[str, Any]] = Field(default_factory=dict)
     # Folder of a comparison: runs start from its weights of the same network and fold. Networks that it does not have
     # start from random weights.
     start_from: str | None = None

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from doorstate.errors import WeightsError, summarize_exception
 from doorstate.inference.abstention import AbstentionCode
 from doorstate.inference.backends.base import Outputs
-from doorstate.inference.backends.onnx_interface import Form, Interface
+from doorstate.inference.backends.onnx_interface import Interface, TensorSpec
 from doorstate.inference.backends.threads import default_threads
 from doorstate.networks.card import CARD_KEY, WeightsCard
 from doorstate.networks.card_file import read_card
@@ -37,7 +37,7 @@ REASONS: tuple[AbstentionCode | None, ...] = (
 )
 """Reasons by their number in the output `reason`; the first that holds is given."""
 TENSOR_PREFIX = "weights."  # of names of tensors that a graph takes from a weights file
-_LOG_NO_ERRORS = 4  # they are raised too
+_LOG_FATAL_ONLY = 4  # errors are raised as well
 # Parts of onnxruntime's messages about files that are newer than itself.
 _NEWER = ("Unsupported model IR version", "is under development and support for this is limited")
 
@@ -83,12 +83,12 @@ class OnnxBackend:
         columns = head_columns(values, self.card.normalization.placement(points))
         return Outputs(probabilities, columns, self._withheld(outputs[REASON]) if self._refuses else None)
 
-    def _outputs(self) -> dict[str, Form]:
-        """Return the outputs to read, with their forms."""
+    def _outputs(self) -> dict[str, TensorSpec]:
+        """Return the outputs to read by name."""
         probabilities = RAW_PROBABILITIES if self._refuses else PROBABILITIES
-        forms = {probabilities: Form("float32", (len(STATES),))}
-        forms |= {name: Form("float32", (len(HEADS[name].columns),)) for name in self._heads}
-        return forms | ({REASON: Form("int64", ())} if self._refuses else {})
+        specs = {probabilities: TensorSpec("float32", (len(STATES),))}
+        specs |= {name: TensorSpec("float32", (len(HEADS[name].columns),)) for name in self._heads}
+        return specs | ({REASON: TensorSpec("int64", ())} if self._refuses else {})
 
     @staticmethod
     def _withheld(reasons: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -113,7 +113,7 @@ def _open_session(path: Path, threads: int, weights: Path | None, spinning: bool
 
     content = read_weights_file(path)
     options = onnxruntime.SessionOptions()
-    options.log_severity_level = _LOG_NO_ERRORS
+    options.log_severity_level = _LOG_FATAL_ONLY
     options.intra_op_num_threads = threads
     options.add_session_config_entry("session.intra_op.allow_spinning", str(int(spinning)))
     if weights is not None:
