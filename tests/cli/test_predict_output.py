@@ -18,6 +18,10 @@ import pytest
 from doorstate.cli import console
 from doorstate.cli.prediction_output import WRITERS
 from doorstate.cli.prediction_table import PredictionTable
+from doorstate.inference.door import Door
+from doorstate.inference.prediction import Prediction
+from doorstate.inference.serialization import prediction_values, rounded
+from doorstate.types import DoorState
 from tests.cli.helpers import Run
 
 ANSWER: dict[str, Any] = {
@@ -63,6 +67,19 @@ def test_row_shows_probability_angle_width_and_distance(monkeypatch: pytest.Monk
     titles, row = printed([("a.pcd", ANSWER)], monkeypatch)
     assert titles.split() == ["file", "state", "prob.", "angle", "passable", "distance", "ms"]
     assert row.split() == ["a.pcd", "open", "0.95", "87°", "0.81", "m", "5.00", "m", "26"]
+
+
+def test_numbers_are_rounded_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    door = Door(2.3746, 0.0, 90.0, 0.9, DoorState.OPEN, opening_angle_deg=46.46, passable_width_m=0.5546)
+    values = prediction_values(Prediction.from_doors([door], [], 1024, 26.46))
+    _, row = printed([("a.pcd", {"method": "pointnet2"} | values)], monkeypatch)
+    assert row.split()[-6:] == ["46°", "0.55", "m", "2.37", "m", "26"]
+    rows = rounded({"stamp_s": 1.2345678} | values)
+    assert (rows["stamp_s"], rows["doors"][0]["distance_m"], rows["milliseconds"]) == (
+        1.2345678,
+        2.375,
+        26.46,
+    )
 
 
 def test_reason_is_below_its_row_without_numbers_that_look_like_an_answer(

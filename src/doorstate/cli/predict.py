@@ -158,11 +158,11 @@ def _predict(
     predictors: Mapping[str, Predictor], cloud: PosedCloud, door: DoorKnown, row: dict[str, Any]
 ) -> Iterator[dict[str, Any]]:
     from doorstate.inference.posed import predict_posed
-    from doorstate.inference.serialization import prediction_to_dict, require_points
+    from doorstate.inference.serialization import prediction_values, require_points
 
     for method, predictor in predictors.items():
         prediction = require_points(predict_posed(predictor, *cloud, door))
-        yield row | {"method": method} | prediction_to_dict(prediction, format_flag, cloud.pose)
+        yield row | {"method": method} | prediction_values(prediction, format_flag, cloud.pose)
 
 
 def _name(path: Path) -> str:

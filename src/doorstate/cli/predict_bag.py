@@ -55,7 +55,7 @@ def _predict_messages(
 ) -> Iterator[Rows]:
     """Yield the rows of each message; a bag that is damaged from somewhere on ends with an error row."""
     from doorstate.inference.posed import predict_posed
-    from doorstate.inference.serialization import prediction_to_dict
+    from doorstate.inference.serialization import prediction_values
 
     try:
         for stamp_s, _, cloud, pose in clouds:
@@ -66,7 +66,7 @@ def _predict_messages(
                 rows = []
                 for method, predictor in predictors.items():
                     prediction = predict_posed(predictor, cloud, pose, door)
-                    rows.append(row | {"method": method} | prediction_to_dict(prediction, format_flag, pose))
+                    rows.append(row | {"method": method} | prediction_values(prediction, format_flag, pose))
                 yield rows
             except DoorstateError as error:
                 yield [row | {"error": error.describe(format_flag, with_path=False)}]

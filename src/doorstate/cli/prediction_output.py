@@ -15,7 +15,7 @@ from doorstate._paths import csv_name
 from doorstate.cli.console import json_line, print_json
 
 Rows = list[dict[str, Any]]
-"""Predictions of all methods for one cloud, or one row with its `error`; each names its cloud."""
+"""`prediction_values` of all methods for one cloud, or one row with its `error`; each names its cloud."""
 Write = Callable[[dict[str, Any]], None]
 
 
@@ -73,15 +73,17 @@ class Output(NamedTuple):
         """Yield a function that writes a row; a file is written whole or not at all."""
         from doorstate._files import atomic_path
         from doorstate.cli.prediction_table import PredictionTable
+        from doorstate.inference.serialization import rounded
 
         if self.path is not None:
             with (
                 atomic_path(self.path) as temporary,
                 temporary.open("w", newline="", encoding="utf-8") as stream,
             ):
-                yield WRITERS[self.path.suffix](stream, self.key)
+                write_rounded = WRITERS[self.path.suffix](stream, self.key)
+                yield lambda row: write_rounded(rounded(row))
         elif self.as_json:
-            yield print_json
+            yield lambda row: print_json(rounded(row))
         else:
             table = PredictionTable(self.key.removesuffix("_s"), names, methods)
 

@@ -97,7 +97,7 @@ class PredictionTable:
 
         Args:
             name: file, or time stamp of a message.
-            row: prediction by `prediction_to_dict`, with its `method`.
+            row: prediction by `prediction_values`, with its `method`.
         """
         if self._last_name is None:
             self._print_titles()
