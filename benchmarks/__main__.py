@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from benchmarks.options import (
-    environment_and,
-    finish,
+    describe_run,
     parse_integers,
     parse_networks,
     parse_points,
     print_stored,
+    store_and_print,
 )
 from doorstate.errors import ConfigError, DoorstateError
 
@@ -84,7 +84,7 @@ def networks(
     ports = {"pointnet": port_pointnet, "pointnet2": port_pointnet, "dgcnn": port_dgcnn}
     checkouts = {name: path for name, path in ports.items() if path is not None}
     plan = Plan(batch, repeats, threads, checkouts, pyg, same_allocator, compiled)
-    settings = environment_and(
+    settings = describe_run(
         batch=batch,
         repeats=repeats,
         threads=threads,
@@ -124,7 +124,7 @@ def latency(
     numbers_of_threads = parse_integers("threads", threads, 1)
     with progress_bar("latency") as progress:
         rows = measure_latency(names, numbers_of_points, numbers_of_threads, repeats, progress)
-    finish(out, "latency", rows, latency_table(rows), threads=threads, repeats=repeats)
+    store_and_print(out, "latency", rows, latency_table(rows), threads=threads, repeats=repeats)
 
 
 @app.command()
@@ -156,7 +156,7 @@ def doorways(
         )
     table = doorways_table(rows, has_weights=weights is not None)
     name = f"untrained {network}" if weights is None else weights.name
-    finish(out, "doorways", rows, table, weights=name, threads=threads, repeats=repeats)
+    store_and_print(out, "doorways", rows, table, weights=name, threads=threads, repeats=repeats)
 
 
 @app.command()
@@ -183,7 +183,9 @@ def busy(
     numbers_of_busy = parse_integers("processes", processes, 0)
     with progress_bar("busy") as progress:
         rows = measure_busy(network, names, numbers_of_threads, numbers_of_busy, repeats, progress)
-    finish(out, "busy", rows, busy_table(rows), network=network, processes=processes, repeats=repeats)
+    store_and_print(
+        out, "busy", rows, busy_table(rows), network=network, processes=processes, repeats=repeats
+    )
 
 
 @app.command()
@@ -200,7 +202,7 @@ def rules(
 
     with progress_bar("rules") as progress:
         rows = measure_rules(count, points, threads, repeats, progress)
-    finish(out, "rules", rows, rules_table(rows), clouds=count, threads=threads, repeats=repeats)
+    store_and_print(out, "rules", rows, rules_table(rows), clouds=count, threads=threads, repeats=repeats)
 
 
 @app.command()
@@ -223,7 +225,9 @@ def profile(
     clouds = simulated_clouds(batch, points).first_points(points)
     with progress_bar("profile") as progress:
         rows = measure_profile(names, profiled_forms(form), clouds, batch, threads, progress)
-    finish(out, "profile", rows, profile_table(rows, batch), points=points, batch=batch, threads=threads)
+    store_and_print(
+        out, "profile", rows, profile_table(rows, batch), points=points, batch=batch, threads=threads
+    )
 
 
 @app.command()
@@ -237,7 +241,7 @@ def knn(out: Out, points: Points = _ALL_POINTS, repeats: Repeats = 5, threads: T
     with progress_bar("knn") as progress:
         clouds = simulated_clouds(1, max(numbers_of_points))
         rows = measure_neighbours(clouds, numbers_of_points, repeats, threads, progress)
-    finish(out, "knn", rows, neighbours_table(rows), threads=threads, repeats=repeats)
+    store_and_print(out, "knn", rows, neighbours_table(rows), threads=threads, repeats=repeats)
 
 
 @app.command()
@@ -266,7 +270,7 @@ def service(
     options += [] if points is None else ["--points", str(points)]
     with progress_bar("service") as progress:
         rows = measure_service(numbers_of_clients, seconds, options, progress)
-    finish(
+    store_and_print(
         out,
         "service",
         rows,

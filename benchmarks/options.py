@@ -52,18 +52,18 @@ def parse_integers(option: str, text: str, minimum: int) -> list[int]:
     return [int(word) for word in words]
 
 
-def environment_and(**options: Any) -> dict[str, Any]:
+def describe_run(**options: Any) -> dict[str, Any]:
     """Return everything that results depend on: machine, versions and options."""
     from doorstate._environment import describe_environment
 
     return describe_environment() | options
 
 
-def finish(out: Path, name: str, rows: list[dict[str, Any]], table: Table, **options: Any) -> None:
+def store_and_print(out: Path, name: str, rows: list[dict[str, Any]], table: Table, **options: Any) -> None:
     """Store and print the results of a benchmark that is measured as a whole."""
     from benchmarks.store import save_rows
 
-    save_rows(out, name, environment_and(**options), rows, table)
+    save_rows(out, name, describe_run(**options), rows, table)
     print_stored(table, out / f"{name}.md")
 
 

@@ -12,7 +12,7 @@ from pydantic import TypeAdapter, ValidationError
 from doorstate._models import Name
 from doorstate.clouds.augmentation import Augmentation
 from doorstate.clouds.preparation import CloudSpec
-from doorstate.dataset.store import DatasetDescription
+from doorstate.dataset.description import DatasetDescription
 from doorstate.errors import CameraError, ConfigError
 from doorstate.evaluation.results import ComparisonConfig
 from doorstate.io.camera import Intrinsics

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from doorstate._files import write_csv
-from doorstate.dataset.store import CLOUDS_FILE, DatasetDescription
+from doorstate.dataset.description import DatasetDescription
+from doorstate.dataset.store import CLOUDS_FILE
 from doorstate.simulation.camera import DepthCamera
 from doorstate.simulation.manifest import MANIFEST_FILE
 from doorstate.simulation.presets import PRESETS

@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from doorstate.dataset.description import DESCRIPTION_FILE
 from doorstate.dataset.join import join_datasets
-from doorstate.dataset.store import CLOUDS_FILE, DESCRIPTION_FILE, PARTS_FILE, PreparedDataset, open_dataset
+from doorstate.dataset.store import CLOUDS_FILE, PARTS_FILE, PreparedDataset, open_dataset
 from doorstate.errors import ConfigError, DatasetError
 from doorstate.simulation.manifest import MANIFEST_FILE
 from tests.error_fields import about

@@ -12,9 +12,10 @@ import pytest
 from doorstate._files import read_csv, write_csv
 from doorstate.clouds.preparation import CloudSpec, prepare_cloud
 from doorstate.dataset import prepare
+from doorstate.dataset.description import DESCRIPTION_FILE
 from doorstate.dataset.preparation import Preparation
 from doorstate.dataset.prepare import REJECTED, prepare_dataset
-from doorstate.dataset.store import CLOUDS_FILE, DESCRIPTION_FILE, PARTS_FILE, open_dataset
+from doorstate.dataset.store import CLOUDS_FILE, PARTS_FILE, open_dataset
 from doorstate.dataset.strata import distance_band, region
 from doorstate.errors import ConfigError, DatasetError
 from doorstate.io.options import ReadOptions

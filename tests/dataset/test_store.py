@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from doorstate.dataset.store import CLOUDS_FILE, DESCRIPTION_FILE, PARTS_FILE, open_dataset
+from doorstate.dataset.description import DESCRIPTION_FILE
+from doorstate.dataset.store import CLOUDS_FILE, PARTS_FILE, open_dataset
 from doorstate.errors import DatasetError
 from doorstate.simulation.manifest import MANIFEST_FILE
 from doorstate.types import STATES

@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 from doorstate._files import write_csv
+from doorstate.dataset.description import DatasetDescription
 from doorstate.dataset.splits import draw_splits, read_splits, write_splits
-from doorstate.dataset.store import CLOUDS_FILE, PARTS_FILE, DatasetDescription, PreparedDataset, open_dataset
+from doorstate.dataset.store import CLOUDS_FILE, PARTS_FILE, PreparedDataset, open_dataset
 from doorstate.dataset.strata import distance_band, region
 from doorstate.simulation.manifest import MANIFEST_FILE, flatten
 from doorstate.simulation.presets import PRESETS, draw_rows

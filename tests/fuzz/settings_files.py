@@ -18,7 +18,8 @@ from safetensors.numpy import save
 from torch import nn
 
 from doorstate._files import read_csv
-from doorstate.dataset.store import DatasetDescription, open_dataset
+from doorstate.dataset.description import DatasetDescription
+from doorstate.dataset.store import open_dataset
 from doorstate.evaluation.predictions import load_results
 from doorstate.inference.backends.onnx_backend import INPUT, PROBABILITIES, OnnxBackend
 from doorstate.networks.card import CARD_KEY, WeightsCard

@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 
 from doorstate.clouds.measured import is_measured
-from doorstate.doorways.finder import find_doorways
+from doorstate.doorways.doorway import Doorway
+from doorstate.doorways.finder import FinderSettings, find_doorways
 from doorstate.inference.door import Door
 from doorstate.inference.gate import DEFAULT_GATE, DoorwayCheck
 from doorstate.io.depth import depth_to_points
@@ -22,6 +23,7 @@ from doorstate.simulation.camera import CAMERAS
 from doorstate.simulation.frames import level
 from doorstate.simulation.generate import simulate_rows
 from doorstate.simulation.presets import PRESETS
+from doorstate.simulation.true_door import TrueDoor
 from doorstate.simulation.truth import true_doors
 from doorstate.types import DoorState, Part, Points
 from tests.doorways import scenes
@@ -34,9 +36,18 @@ _OPEN_WITHOUT_LEAF = "02_open"
 
 
 def _check(made: HandMade, state: DoorState, cloud: Points | None = None) -> DoorwayCheck:
-    true = made.doors[0]
-    door = Door(true.x_m, true.y_m, true.yaw_deg, true.width_m, state, floor_z_m=made.floor_z_m)
-    return DEFAULT_GATE.check_doorways(made.points if cloud is None else cloud, [door])[0]
+    door = _said(made.doors[0], state, made.floor_z_m)
+    return _check_door(made.points if cloud is None else cloud, door)
+
+
+def _said(place: TrueDoor | Doorway, state: DoorState, floor_z_m: float) -> Door:
+    """Return a door at a place that is said to have a state."""
+    return Door(place.x_m, place.y_m, place.yaw_deg, place.width_m, state, floor_z_m=floor_z_m)
+
+
+def _check_door(cloud: Points, door: Door) -> DoorwayCheck:
+    (check,) = DEFAULT_GATE.check_doorways(cloud, [door])
+    return check
 
 
 def _code(check: DoorwayCheck) -> str | None:
@@ -127,10 +138,10 @@ def test_one_open_leaf_of_a_double_door_is_enough() -> None:
 @pytest.mark.parametrize("make", scenes.WITHOUT_DOOR.values(), ids=scenes.WITHOUT_DOOR)
 def test_furniture_is_no_seen_leaf(make: Callable[[], HandMade]) -> None:
     made = make()
-    doors = [
-        Door(found.x_m, found.y_m, found.yaw_deg, found.width_m, DoorState.OPEN, floor_z_m=made.floor_z_m)
-        for found in find_doorways(made.points, made.floor_z_m)
-    ]
+    improbable = FinderSettings(min_score=0.0)
+    found = find_doorways(made.points, made.floor_z_m, improbable)
+    doors = [_said(doorway, DoorState.OPEN, made.floor_z_m) for doorway in found]
+    assert doors
     assert not any(check.leaf_seen for check in DEFAULT_GATE.check_doorways(made.points, doors))
 
 
@@ -153,8 +164,7 @@ def test_what_stands_before_dark_and_glass_leaves_is_no_seen_leaf(
         assert true.kind == kind
         dark = frame.points.copy()
         dark[frame.cut.part == Part.LEAF] = np.nan
-        door = Door(true.x_m, true.y_m, true.yaw_deg, true.width_m, DoorState.OPEN, floor_z_m=true.floor_z_m)
-        assert not DEFAULT_GATE.check_doorways(dark, [door])[0].leaf_seen
+        assert not _check_door(dark, _said(true, DoorState.OPEN, true.floor_z_m)).leaf_seen
 
 
 @pytest.mark.parametrize(
@@ -165,8 +175,8 @@ def test_open_doors_seen_along_the_wall_are_not_blocked(preset: str, sensor: str
     rows, frames = simulate_rows(PRESETS[preset], 66002, index, sensor)
     (opened,) = [number for number, row in enumerate(rows) if row.state == "open"]
     true = true_doors(rows[opened])[0]
-    door = Door(true.x_m, true.y_m, true.yaw_deg, true.width_m, DoorState.OPEN, floor_z_m=true.floor_z_m)
-    assert _code(DEFAULT_GATE.check_doorways(frames[opened].points, [door])[0]) is None
+    door = _said(true, DoorState.OPEN, true.floor_z_m)
+    assert _code(_check_door(frames[opened].points, door)) is None
 
 
 def test_a_sliding_leaf_behind_a_thick_wall_blocks_its_opening() -> None:
@@ -174,8 +184,8 @@ def test_a_sliding_leaf_behind_a_thick_wall_blocks_its_opening() -> None:
     (closed,) = [number for number, row in enumerate(rows) if row.state == "closed"]
     true = true_doors(rows[closed])[0]
     assert true.kind == "sliding"
-    door = Door(true.x_m, true.y_m, true.yaw_deg, true.width_m, DoorState.OPEN, floor_z_m=true.floor_z_m)
-    assert _code(DEFAULT_GATE.check_doorways(frames[closed].points, [door])[0]) == "opening_blocked"
+    door = _said(true, DoorState.OPEN, true.floor_z_m)
+    assert _code(_check_door(frames[closed].points, door)) == "opening_blocked"
 
 
 def test_a_leaf_of_glass_is_never_a_seen_leaf() -> None:
@@ -223,11 +233,8 @@ def test_something_that_stands_before_a_door_occludes_it() -> None:
 
 def test_a_door_out_of_view_is_refused() -> None:
     made = scenes.dark_leaf()
-    true = made.doors[0]
-    door = Door(
-        true.x_m, true.y_m + 6, true.yaw_deg, true.width_m, DoorState.CLOSED, floor_z_m=made.floor_z_m
-    )
-    assert _code(DEFAULT_GATE.check_doorways(made.points, [door])[0]) == "door_out_of_view"
+    door = _said(made.doors[0], DoorState.CLOSED, made.floor_z_m)
+    assert _code(_check_door(made.points, replace(door, y_m=door.y_m + 6))) == "door_out_of_view"
 
 
 @pytest.mark.parametrize("kind", ["none", "rectangle", "random", "flat"])
@@ -235,9 +242,7 @@ def test_losses_do_not_silence_measured_doors(kind: str) -> None:
     rng = np.random.default_rng(0)
     refused, unseen = [], []
     for name, points, door in _frames():
-        check = DEFAULT_GATE.check_doorways(
-            points if kind == "none" else _with_loss(points, rng, kind), [door]
-        )[0]
+        check = _check_door(points if kind == "none" else _with_loss(points, rng, kind), door)
         refused += [name] if check.abstention is not None else []
         unseen += [name] if door.state is DoorState.OPEN and not check.leaf_seen else []
     assert set(refused) <= {_OPEN_WITHOUT_LEAF}
@@ -247,8 +252,8 @@ def test_losses_do_not_silence_measured_doors(kind: str) -> None:
 def test_closed_doors_of_gazebo_are_never_confirmed_as_open() -> None:
     for _, points, door in _frames():
         if door.state is DoorState.CLOSED:
-            said = Door(door.x_m, door.y_m, door.yaw_deg, 0.9, DoorState.OPEN, floor_z_m=door.floor_z_m)
-            assert _code(DEFAULT_GATE.check_doorways(points, [said])[0]) == "opening_blocked"
+            opened = replace(door, state=DoorState.OPEN)
+            assert _code(_check_door(points, opened)) == "opening_blocked"
 
 
 def test_doors_are_checked_as_if_each_were_alone() -> None:
@@ -257,10 +262,10 @@ def test_doors_are_checked_as_if_each_were_alone() -> None:
     doors = [replace(door, state=state) for state in DoorState]
     doors += [replace(door, y_m=door.y_m + 6), replace(door, state=None)]
     together = DEFAULT_GATE.check_doorways(points, doors)
-    assert together == [DEFAULT_GATE.check_doorways(points, [door])[0] for door in doors]
+    assert together == [_check_door(points, door) for door in doors]
     assert len({_code(check) for check in together}) > 1
 
 
 def test_a_door_without_state_or_points_is_not_checked() -> None:
     door = Door(2.0, 0.0, 90.0, 0.9, None, floor_z_m=-1.0)
-    assert DEFAULT_GATE.check_doorways(np.ones((9, 3), np.float32), [door])[0] == DoorwayCheck(None)
+    assert _check_door(np.ones((9, 3), np.float32), door) == DoorwayCheck(None)

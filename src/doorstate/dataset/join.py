@@ -12,14 +12,9 @@ import numpy as np
 from doorstate import __version__
 from doorstate._files import is_scratch, is_vacant, write_csv
 from doorstate._locks import owned_folder
+from doorstate.dataset.description import DatasetDescription
 from doorstate.dataset.pieces import write_concatenated
-from doorstate.dataset.store import (
-    CLOUDS_FILE,
-    PARTS_FILE,
-    DatasetDescription,
-    PreparedDataset,
-    open_dataset,
-)
+from doorstate.dataset.store import CLOUDS_FILE, PARTS_FILE, PreparedDataset, open_dataset
 from doorstate.errors import ConfigError, DatasetError
 from doorstate.simulation.manifest import MANIFEST_FILE
 

@@ -13,19 +13,13 @@ from doorstate._files import is_vacant, read_csv, write_csv
 from doorstate._jobs import Progress, Shard, default_workers, no_progress, piece_paths, run_pieces
 from doorstate._locks import owned_folder
 from doorstate._paths import check_encoding, csv_name
+from doorstate.dataset.description import DESCRIPTION_FILE, DatasetDescription
 from doorstate.dataset.frame_index import IndexedOptions
 from doorstate.dataset.layouts import find_layout
 from doorstate.dataset.pieces import PieceClouds, SavedPieces
 from doorstate.dataset.preparation import CLAIM, Preparation
 from doorstate.dataset.sampling import rejected_sample, samples_of_frame, samples_of_recording
-from doorstate.dataset.store import (
-    CLOUDS_FILE,
-    DESCRIPTION_FILE,
-    PARTS_FILE,
-    DatasetDescription,
-    PreparedDataset,
-    open_dataset,
-)
+from doorstate.dataset.store import CLOUDS_FILE, PARTS_FILE, PreparedDataset, open_dataset
 from doorstate.errors import CameraError, CloudError, DatasetError
 from doorstate.io.readers import read_cloud
 from doorstate.simulation.frames import Frame, depth_sha256, replay

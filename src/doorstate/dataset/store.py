@@ -9,19 +9,18 @@ from __future__ import annotations
 from collections import Counter
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, ValidationError
+from pydantic import ValidationError
 
 from doorstate._documents import read_json
-from doorstate._files import read_csv, write_text
+from doorstate._files import read_csv
 from doorstate._input import MAX_SETTINGS_BYTES, check_input
-from doorstate._models import FrozenModel
-from doorstate.clouds.normalization import NORMALIZATIONS, Input, Normalization
-from doorstate.clouds.preparation import MAX_NUM_POINTS, CloudSpec
-from doorstate.dataset.crops import Crops, doorway_of, frame_row
+from doorstate.clouds.normalization import NORMALIZATIONS, Normalization
+from doorstate.dataset.crops import doorway_of, frame_row
+from doorstate.dataset.description import DESCRIPTION_FILE, DatasetDescription
 from doorstate.dataset.sampling import sample_crop, sample_frame
 from doorstate.doorways.crop import DEFAULT_CROP
 from doorstate.errors import ConfigError, DatasetError, first_validation_error
@@ -30,49 +29,11 @@ from doorstate.simulation.manifest import MANIFEST_FILE, unflatten
 from doorstate.simulation.shading import shade
 from doorstate.types import NO_DOOR, STATES, Indices, Points
 
-CLOUDS_FILE, PARTS_FILE, DESCRIPTION_FILE = "clouds.npy", "parts.npy", "dataset.json"
-MAX_SAMPLES = 100_000_000
+CLOUDS_FILE, PARTS_FILE = "clouds.npy", "parts.npy"
 _LABELS = (*STATES, NO_DOOR)
 _CACHED_CLOUDS = 512
 _CACHED_IMAGES = 64  # a megabyte each
 _T = TypeVar("_T")
-
-
-class DatasetDescription(FrozenModel):
-    """Contents of a prepared folder, as in `dataset.json`."""
-
-    kind: Literal["simulated", "imported"]
-    source: str
-    num_points: int = Field(ge=1, le=MAX_NUM_POINTS)
-    samples: int = Field(ge=0, le=MAX_SAMPLES)
-    doorstate_version: str
-    clouds: Literal["stored", "replayed"] = "stored"  # replayed: rendered from the manifest
-    max_depth_m: float | None = Field(default=None, gt=0)  # points farther ahead were left out
-    thin: bool = False  # sampled from some rows and columns of each image, as a predictor does
-    remove_outliers: bool = False  # not in data sets of version 0.1
-    crops: Crops | None = None  # of doorways, in the frame of each; None for whole clouds in the sensor frame
-    left_out: dict[str, Annotated[int, Field(ge=1)]] = Field(
-        default_factory=dict
-    )  # clouds by state (rejected.csv)
-
-    @property
-    def input(self) -> Input:
-        """Clouds that a network gets."""
-        return "whole" if self.crops is None else "doorway"
-
-    @property
-    def spec(self) -> CloudSpec:
-        """Settings the clouds were prepared with."""
-        return CloudSpec(
-            num_points=self.num_points,
-            thin=self.thin,
-            max_depth_m=self.max_depth_m,
-            remove_outliers=self.remove_outliers,
-        )
-
-    def save(self, folder: Path) -> None:
-        """Write `dataset.json`, which marks the folder as complete."""
-        write_text(folder / DESCRIPTION_FILE, self.model_dump_json(indent=2) + "\n")
 
 
 class PreparedDataset:
