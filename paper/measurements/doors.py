@@ -9,6 +9,7 @@ from typing import NamedTuple
 import pandas as pd
 
 from doorstate._jobs import Progress
+from doorstate.dataset.crops import HIT_M
 from doorstate.errors import ConfigError
 from doorstate.evaluation.table import Table, count_column, label_column, number_column, text_column
 from doorstate.inference.doorway_predictor import DoorwayPredictor
@@ -18,7 +19,6 @@ from doorstate.simulation.true_door import TrueDoor
 from doorstate.simulation.truth import true_doors
 
 from .doorways import (
-    NEAR_M,
     SEED,
     SOURCES,
     VISIBLE_PX,
@@ -156,7 +156,7 @@ def doors_table(doors: Sequence[FoundDoor], frames: Sequence[AnsweredFrame]) -> 
             label_column("preset"),
             label_column("sensor"),
             count_column("doors"),
-            number_column("found", f"found within {NEAR_M:g} m", 3),
+            number_column("found", f"found within {HIT_M:g} m", 3),
             number_column("exact", f"of these within {_EXACT_M:g} m", 3),
             number_column("median", "median error, cm", 1),
             number_column("silent", "without a state", 3),
@@ -196,7 +196,7 @@ def reasons_table(doors: Sequence[FoundDoor]) -> Table:
         text_column("wrong", "wrong states"),
     ]
     note = (
-        f"*No candidate*: the search proposes nothing within {NEAR_M:g} m, or something likelier that overlaps. Other "
+        f"*No candidate*: the search proposes nothing within {HIT_M:g} m, or something likelier that overlaps. Other "
         "words are codes of reasons."
     )
     return Table.from_frame("Reasons", pd.DataFrame(lines), columns, note)

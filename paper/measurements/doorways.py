@@ -13,6 +13,7 @@ import pandas as pd
 from doorstate._jobs import Progress
 from doorstate.clouds.floor import find_floor_z_m
 from doorstate.clouds.outliers import remove_outliers
+from doorstate.dataset.crops import HIT_DEG, HIT_M
 from doorstate.doorways.doorway import Doorway
 from doorstate.doorways.finder import find_doorways
 from doorstate.evaluation.table import Table, count_column, label_column, number_column
@@ -30,10 +31,8 @@ SOURCES: tuple[Source, ...] = tuple(
     for preset in ("varied", "cluttered", "corridor", "two-doors", "no-door")
     for sensor in ("xtion", "d435")
 )
-NEAR_M = 0.35  # of a door: a network corrects a candidate so near
 VISIBLE_PX = 1500  # of a door that should be found
 _EXACT_M, _EXACT_DEG = 0.08, 4.0
-_NEAR_DEG = 20.0
 
 
 class Placed(Protocol):
@@ -119,7 +118,7 @@ def gap_to(door: TrueDoor, place: Placed) -> tuple[float, float]:
 
 def nearest(door: TrueDoor, places: Iterable[AnyPlaced]) -> AnyPlaced | None:
     """Return the place nearest to a door, of those within 0.35 m; None if there is none."""
-    near = [place for place in places if gap_to(door, place)[0] <= NEAR_M]
+    near = [place for place in places if gap_to(door, place)[0] <= HIT_M]
     return min(near, key=lambda place: gap_to(door, place)[0], default=None)
 
 
@@ -168,7 +167,7 @@ def doorways_table(doors: Sequence[DoorResult], frames: Sequence[FrameResult]) -
             label_column("preset"),
             label_column("sensor"),
             count_column("doors"),
-            number_column("near", f"within {NEAR_M} m and {_NEAR_DEG:g}°", 3),
+            number_column("near", f"within {HIT_M} m and {HIT_DEG:g}°", 3),
             number_column("exact", f"within {_EXACT_M} m and {_EXACT_DEG:g}°", 3),
             number_column("first", "best candidate", 3),
             number_column("candidates", "candidates a frame", 1),
@@ -180,7 +179,7 @@ def doorways_table(doors: Sequence[DoorResult], frames: Sequence[FrameResult]) -
 
 def _door_result(preset: str, sensor: str, door: TrueDoor, candidates: Sequence[Doorway]) -> DoorResult:
     errors = [gap_to(door, candidate) for candidate in candidates]
-    near = [place_m <= NEAR_M and turn_deg <= _NEAR_DEG for place_m, turn_deg in errors]
+    near = [place_m <= HIT_M and turn_deg <= HIT_DEG for place_m, turn_deg in errors]
     exact = [place_m <= _EXACT_M and turn_deg <= _EXACT_DEG for place_m, turn_deg in errors]
     return DoorResult(
         preset=preset,

@@ -8,7 +8,7 @@ metres.
 from __future__ import annotations
 
 from enum import IntEnum, StrEnum
-from typing import Final, Self
+from typing import Final, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,9 @@ from numpy.typing import NDArray
 Points = NDArray[np.float32]  # (N, 3) metres
 DepthImage = NDArray[np.float32]  # (H, W) z-depth in metres, NaN where nothing was measured
 Indices = NDArray[np.int64]
+
+Hinge = Literal["left", "right"]  # side of the hinge as seen from the camera
+Swing = Literal["away", "towards"]  # direction in which a leaf opens, as seen from the camera
 
 MAX_COORDINATE: Final = 1e6  # of a point, in any unit; some drivers write FLT_MAX where nothing was measured
 

@@ -20,7 +20,7 @@ Write = Callable[[dict[str, Any]], None]
 
 
 class Output(NamedTuple):
-    """Where predictions go, and how their clouds are named."""
+    """Destination of predictions, and the names of their clouds."""
 
     key: str  # field that names a cloud: `file`, or `stamp_s` of messages
     noun: str

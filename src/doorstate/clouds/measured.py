@@ -15,7 +15,7 @@ def is_measured(points: NDArray[np.floating[Any]]) -> NDArray[np.bool_]:
     """Return a mask (...) of the points (..., 3) that are not NaN, infinite, larger than any room, or (0, 0, 0)."""
     with np.errstate(invalid="ignore"):  # comparing a signalling NaN, as some drivers write, is "invalid"
         x, y, z = (np.abs(points[..., axis]) for axis in range(3))
-        largest = np.maximum(np.maximum(x, y), z)  # NaN, if one is
+        largest = np.maximum(np.maximum(x, y), z)  # NaN if one of them is, which is not below the limit
         mask: NDArray[np.bool_] = (largest < MAX_COORDINATE) & (largest > 0)
     return mask
 

@@ -96,7 +96,7 @@ def _axes(normals: Floats) -> Floats:
     """Return the normals of planes, and the lines in which two of them meet."""
     first, second = np.tril_indices(len(normals), -1)
     lines = np.cross(normals[first], normals[second])
-    lengths = np.sqrt([line @ line for line in lines])
+    lengths = np.sqrt([line @ line for line in lines])  # to the bit those of np.linalg.norm of each line
     meet = np.flatnonzero(lengths > _MIN_MEETING)
     return np.concatenate([normals, lines[meet] / lengths[meet, None]])
 

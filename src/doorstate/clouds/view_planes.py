@@ -33,7 +33,7 @@ _TOLERANCE = 2.5  # deviations of inverse depth
 _NOISE_QUANTILE = 0.4  # least share of the cells that hold a single plane
 _NOISE_LIMITS = 0.0007, 0.012  # 1 / m; of a perfect and of a poor camera
 _RIDGE = 1e-7
-_UNIT = np.eye(3)
+_IDENTITY = np.eye(3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,7 +186,7 @@ def _regress(uu: Floats, uq: Floats) -> Floats:
 def _with_ridge(uu: Floats) -> Floats:
     """Return sums of squares (..., 3, 3) that are never singular."""
     trace = uu[..., 0, 0] + uu[..., 1, 1] + uu[..., 2, 2]
-    with_ridge: Floats = uu + (_RIDGE * trace)[..., None, None] * _UNIT
+    with_ridge: Floats = uu + (_RIDGE * trace)[..., None, None] * _IDENTITY
     return with_ridge
 
 
@@ -195,6 +195,6 @@ def _plane(cells: _Cells, members: NDArray[np.bool_], noise: float) -> ViewPlane
     plane = _regress(uu, uq)
     length = float(np.linalg.norm(plane))
     normal = plane / length
-    across = (_UNIT - normal[:, None] * normal) * (noise / length)
+    across = (_IDENTITY - normal[:, None] * normal) * (noise / length)
     variance = float((across @ np.linalg.inv(_with_ridge(uu)) @ across).trace())
     return ViewPlane(normal, 1 / length, float(members.mean()), math.degrees(math.sqrt(variance)))

@@ -27,7 +27,7 @@ from doorstate.types import NO_DOOR, Points
 Columns = Mapping[str, str]
 ADDED: Final = "added"  # in the column `candidate`: a door that the finder missed
 _FRAME = "frame."
-_HIT_M, _HIT_DEG = 0.35, 20.0  # a candidate this near a door is one of it
+HIT_M, HIT_DEG = 0.35, 20.0  # a candidate this near a door is one of it
 _MOST_SIGMAS = 2.0
 _VISIBLE_SHARE = 0.005  # of the image: leaf, frame or opening of a door that can be seen
 _POSE = ("x_m", "y_m", "yaw_deg", "width_m", "floor_z_m")
@@ -161,4 +161,4 @@ def _text(value: object) -> str:
 
 def _is_hit(door: TrueDoor, doorway: Doorway) -> bool:
     distance_m, turn_deg = doorway.gap_to(door.x_m, door.y_m, door.yaw_deg)
-    return distance_m <= _HIT_M and turn_deg <= _HIT_DEG
+    return distance_m <= HIT_M and turn_deg <= HIT_DEG

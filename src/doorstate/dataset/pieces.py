@@ -119,6 +119,7 @@ class SavedPieces(NamedTuple):
 
 @contextmanager
 def _open_piece(path: Path) -> Iterator[Any]:
+    """Open the arrays of a piece; errors of a damaged one become a `DatasetError`."""
     try:
         with open_input(path, None, DatasetError) as stream, np.load(stream, allow_pickle=False) as piece:
             yield piece

@@ -96,12 +96,12 @@ class DoorwayEvidence:
 
     @property
     def nearest_m(self) -> float:
-        """Least range in the cloud."""
+        """Least range in the cloud (`MeasuredView.range_limits_m`)."""
         return self.cells.view.range_limits_m[0]
 
     @property
     def farthest_m(self) -> float:
-        """Largest range in the cloud."""
+        """Largest range in the cloud (`MeasuredView.range_limits_m`)."""
         return self.cells.view.range_limits_m[1]
 
     @cached_property

@@ -6,7 +6,7 @@ A leaf ends where a wall goes on. So what reaches beyond the leaf's free edge, o
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from doorstate.doorways.doorway import Doorway
 from doorstate.doorways.measured_view import MeasuredView
 from doorstate.doorways.reach import Reach
+from doorstate.types import Hinge, Swing
 
-Hinge = Literal["left", "right"]
 Angles = tuple[float, ...]
 
 OPEN_ANGLES_DEG: Angles = tuple(float(angle) for angle in range(60, 136, 5))  # beyond, walls look like leaves
@@ -40,7 +40,7 @@ class SeenLeaf(NamedTuple):
     share: float  # of its cells in view that were measured; that of its outer half if it is smaller
     angle_deg: float
     hinge: Hinge
-    swing: Literal["away", "towards"]
+    swing: Swing
     width_m: float
 
 

@@ -13,8 +13,8 @@ from doorstate.clouds.floor import lowest_z_m
 from doorstate.doorways.elevation import SightLines
 from doorstate.doorways.reach import Reach
 
-_RANGE_QUANTILES = (0.002, 0.995)
-_RANGE_POINTS = 4096
+_RANGE_QUANTILES = (0.002, 0.995)  # without flying pixels
+_RANGE_POINTS = 4096  # at least, evenly picked
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,7 @@ class MeasuredView:
 
     @cached_property
     def range_limits_m(self) -> tuple[float, float]:
-        """Least and largest range, but for noise."""
+        """Least and largest range, without the outermost points."""
         some = self.points[:: max(1, len(self.points) // _RANGE_POINTS)]
         nearest_m, farthest_m = np.quantile(np.linalg.norm(some, axis=1), _RANGE_QUANTILES)
         return float(nearest_m), float(farthest_m)

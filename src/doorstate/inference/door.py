@@ -6,15 +6,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 from doorstate.doorways.remoteness import remoteness_m
 from doorstate.inference.abstention import Abstention
 from doorstate.inference.answer import StateAnswer
 from doorstate.inference.seen_through import Opening
-from doorstate.types import DoorState
-
-Hinge = Literal["left", "right"]
+from doorstate.types import DoorState, Hinge
 
 
 class DoorFrame(NamedTuple):

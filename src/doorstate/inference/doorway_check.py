@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Check of one door: does the cloud show at its place what its state says, and if not, why."""
+"""Check of single doors: a reason against a state that the cloud does not show at the door's place."""
 
 from __future__ import annotations
 
@@ -15,34 +15,39 @@ from doorstate.doorways.doorway import Doorway
 from doorstate.doorways.evidence import DoorwayEvidence, find_evidence
 from doorstate.doorways.finder import thinned
 from doorstate.doorways.leaf_shape import find_leaf_angle_deg
-from doorstate.doorways.leaf_sweep import MIN_WIDTH_M, SEMI_OPEN_ANGLES_DEG, Hinge, SeenLeaf, sweep_leaf
+from doorstate.doorways.leaf_sweep import MIN_WIDTH_M, SEMI_OPEN_ANGLES_DEG, SeenLeaf, sweep_leaf
 from doorstate.doorways.measured_view import MeasuredView
 from doorstate.inference.abstention import Abstention
 from doorstate.inference.door import Door
 from doorstate.inference.seen_through import FloorRays, Opening, floor_rays
-from doorstate.types import DoorState, Points
+from doorstate.types import DoorState, Hinge, Points
 
 _MAX_POINTS = 12_000  # of a cloud: eight for each cell of a door 2.5 m away
-_MIN_IN_VIEW = 0.06  # of an opening
-_MIN_SURFACE = 0.25  # of a closed door
-_MOSTLY_FLUSH = 0.8  # of the surface of an opening: of a closed leaf
-_MIN_PART = 0.15  # of a leaf that is pushed aside, as of sliding doors
-_MIN_THROUGH = 0.1
-_MAX_HIDDEN = 0.6
-_FILLED = 0.75  # of what nothing hides of an opening, by a surface along the wall
-_BLOCKED = 0.5  # of an opening by surfaces, where nothing else confirms that it is open
-_MIN_FILLED = 0.1  # of an opening, of which at least half is in view
-_MAX_FLUSH = 0.5  # of what nothing hides of an opening beside a leaf, by a surface along the wall
-_MIN_FREE = 0.2  # of an opening, that counts for it
-_CROSSED = 0.05  # of an opening that is not closed
-_RETURNED = 0.95  # of the rays to the floor behind an opening: few come back from a dark leaf
-_MIN_OPEN_DEG = 65.0  # doors are called open from 75 degrees on, semi-open up to 65
+# Shares of the cells of an opening that are in view, as in `DoorwayEvidence`; "free" is before and across which nothing
+# stands.
+_MIN_IN_VIEW = 0.06  # of all cells
+_MIN_SURFACE = 0.25  # on the wall: of a closed door, and of a leaf ajar
+_MOSTLY_FLUSH = 0.8  # flush, of what is on the wall: no leaf ajar
+_MIN_PART = 0.15  # flush: of a leaf that is pushed aside, as of sliding doors
+_MIN_THROUGH = 0.1  # through: beside such a leaf, and of an opening that is not filled
+_MAX_HIDDEN, _MAX_HIDDEN_CLOSED = 0.6, 0.5
+_FILLED, _MIN_FILLED = 0.75, 0.1  # flush, of the free share and of all: of a filled opening
+_MIN_IN_VIEW_FILLED = 0.5  # of all cells
+_BLOCKED = 0.5  # on the wall: blocked, if nothing else confirms that the door is open
+_MAX_FLUSH, _MIN_FREE = (
+    0.5,
+    0.2,
+)  # flush beside a seen leaf, of the free share or, if that is smaller, of the second
+_CROSSED = 0.05  # through: of an opening that is not closed
+_CLEAR, _MAX_LOST = 0.9, 0.05  # through, of the free share, and missing: sight lines pass everywhere
+_MIN_SPACE = 0.35  # on the wall but not flush, or through: bounds of an opening that is seen along the wall
+_GLASS = 0.05  # through: seen through, although little came back
+# Shares of the rays to the floor behind an opening.
+_RETURNED = 0.95  # came back: few do from a dark leaf
+_MIN_SEEN_FLOOR = 0.9  # came back, where they pass
+_NO_FLOOR = 0.2  # of the sight lines expected on that floor, ended behind the wall
 _WHOLE_LEAF = 0.95  # of the cells in view of a leaf of an opening that nothing crosses
-_MIN_SEEN_FLOOR = 0.9  # of the rays to it
-_NO_FLOOR = 0.2  # of the sight lines expected on the floor behind an opening
-_CLEAR, _MAX_LOST = 0.9, 0.05  # of what nothing hides of an opening, and missing of all of it
-_MIN_SPACE = 0.35  # of an opening in which sight lines end behind the wall, where they cannot tell more
-_GLASS = 0.05  # of an opening that is seen through, although little came back
+_MIN_OPEN_DEG = 65.0  # doors are called open from 75 degrees on, semi-open up to 65
 _NEAR_RATIO, _NEAR_M = 1.25, 1.0  # of the surroundings of a hole to the least range of the cloud, and at most
 _FAR_RATIO, _FAR_M = 0.8, 4.0  # of the wall to the largest range, and at least: rooms end at walls
 
@@ -119,7 +124,7 @@ def _check_closed(case: _Case) -> DoorwayCheck:
     evidence = case.evidence
     if evidence.on_wall >= _MIN_SURFACE:
         return DoorwayCheck(None)
-    return DoorwayCheck(_hidden(evidence, 0.5) or _reason(evidence))
+    return DoorwayCheck(_hidden(evidence, _MAX_HIDDEN_CLOSED) or _reason(evidence))
 
 
 def _check_semi_open(case: _Case) -> DoorwayCheck:
@@ -173,6 +178,7 @@ def _half(case: _Case, hinge: Hinge) -> _Case:
 
 
 def _check_passage(case: _Case, leaf: SeenLeaf | None) -> DoorwayCheck:
+    """Require a leaf beside an opening that nothing fills, or else sight lines that pass or end on its bounds."""
     evidence, passes, rays = case.evidence, case.passes, case.floor_rays
     # A sliding leaf behind a thick wall lies so far behind its face that rays seem to pass.
     has_floor_behind = (
@@ -196,8 +202,9 @@ def _check_passage(case: _Case, leaf: SeenLeaf | None) -> DoorwayCheck:
 
 
 def _is_filled(evidence: DoorwayEvidence) -> bool:
+    """Return True if a surface along the wall fills what is seen of an opening."""
     is_surface = evidence.flush >= max(_MIN_FILLED, _FILLED * evidence.free)
-    return is_surface and evidence.through < _MIN_THROUGH and evidence.in_view >= 0.5
+    return is_surface and evidence.through < _MIN_THROUGH and evidence.in_view >= _MIN_IN_VIEW_FILLED
 
 
 def _is_clear(evidence: DoorwayEvidence) -> bool:

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from doorstate.inference.abstention import Abstention
 from doorstate.inference.answer import StateAnswer
-from doorstate.inference.door import Door, DoorFrame, Hinge
+from doorstate.inference.door import Door, DoorFrame
 from doorstate.inference.seen_through import Opening
 from doorstate.inference.tilt import Tilt
 from doorstate.inference.validity import are_probabilities
 from doorstate.rules.base import Detection
-from doorstate.types import STATES, DoorState
+from doorstate.types import STATES, DoorState, Hinge
 
 
 @dataclass(frozen=True)

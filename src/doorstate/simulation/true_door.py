@@ -9,8 +9,8 @@ from doorstate._models import Degrees, FrozenModel, Metres
 from doorstate.simulation.draw.openings import state_of
 from doorstate.simulation.scene.box import Pose
 from doorstate.simulation.scene.clearance import passable_width_m
-from doorstate.simulation.scene.door import Door, DoorKind, Opening, Swing
-from doorstate.types import DoorState
+from doorstate.simulation.scene.door import Door, DoorKind, Opening
+from doorstate.types import DoorState, Swing
 
 
 class VisiblePixels(FrozenModel):

@@ -11,10 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from doorstate.simulation.scene import Box, Door, DoorKind, Hinge, Opening, Scene, Swing, scene_boxes
+from doorstate.simulation.scene import Box, Door, DoorKind, Opening, Scene, scene_boxes
 from doorstate.simulation.scene.door_boxes import door_boxes, fixed_boxes, leaf_boxes
 from doorstate.simulation.scene.plan import collide
-from doorstate.types import Part
+from doorstate.types import Hinge, Part, Swing
 from tests.simulation.scene.doors import DOORS, HINGED, LEVER, bare_leaves, span
 
 hinges: st.SearchStrategy[Hinge] = st.sampled_from(("left", "right"))

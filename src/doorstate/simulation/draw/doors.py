@@ -6,8 +6,9 @@ from __future__ import annotations
 from typing import Literal
 
 from doorstate.simulation.draw.stream import Stream
-from doorstate.simulation.scene.door import Door, DoorKind, Hinge, Swing
+from doorstate.simulation.scene.door import Door, DoorKind
 from doorstate.simulation.scene.handle import Handle, HandleKind
+from doorstate.types import Hinge, Swing
 
 KIND_SHARES: dict[DoorKind, float] = {
     "single": 0.5,

@@ -6,17 +6,15 @@ the wall to the robot, z up. Looking at the wall, left is +x.
 """
 
 from doorstate.simulation.scene.box import Box, Material
-from doorstate.simulation.scene.door import Door, DoorKind, Hinge, Opening, Swing
+from doorstate.simulation.scene.door import Door, DoorKind, Opening
 from doorstate.simulation.scene.scene import Scene, scene_boxes
 
 __all__ = [
     "Box",
     "Door",
     "DoorKind",
-    "Hinge",
     "Material",
     "Opening",
     "Scene",
-    "Swing",
     "scene_boxes",
 ]

@@ -7,9 +7,8 @@ from typing import Literal
 
 from doorstate._models import Degrees, FrozenModel, Metres
 from doorstate.simulation.scene.handle import Handle
+from doorstate.types import Hinge, Swing
 
-Hinge = Literal["left", "right"]
-Swing = Literal["away", "towards"]
 DoorKind = Literal["single", "double_equal", "double_unequal", "sliding", "glazed", "full_glass"]
 
 
