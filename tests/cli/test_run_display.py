@@ -62,6 +62,7 @@ def test_table_shows_scores_progress_and_time_left(tmp_path: Path) -> None:
     # PointNet: 5 epochs of 16 s and 5 of 32 s. DGCNN: 2.5 and 5 epochs of 30 s, then 5 and 5 of an estimated 60 s.
     assert minutes(text) == [18]
     assert minutes(table_text(runs, jobs=2)) == [9]
+    assert minutes(table_text(runs, jobs=9)) == [6]  # three are left
 
 
 def test_no_time_left_before_the_first_epoch(tmp_path: Path) -> None:

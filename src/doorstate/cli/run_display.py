@@ -131,7 +131,8 @@ class RunDisplay:
         from doorstate.training.eta import eta_seconds
 
         seconds = eta_seconds(self._runs, self._recipes, self._num_points)
-        return f", about {duration(seconds / self._jobs)} left" if seconds else ""
+        at_once = max(1, min(self._jobs, sum(not run.folder.finished for run in self._runs)))
+        return f", about {duration(seconds / at_once)} left" if seconds else ""
 
     def _cell(self, run: RunSpec) -> Text:
         if run.folder.finished:
