@@ -18,7 +18,8 @@ from benchmarks.options import (
     parse_networks,
     parse_points,
     print_stored,
-    store_and_print,
+    store_results,
+    write_option,
 )
 from doorstate.errors import ConfigError, DoorstateError
 
@@ -124,7 +125,7 @@ def latency(
     numbers_of_threads = parse_integers("threads", threads, 1)
     with progress_bar("latency") as progress:
         rows = measure_latency(names, numbers_of_points, numbers_of_threads, repeats, progress)
-    store_and_print(out, "latency", rows, latency_table(rows), threads=threads, repeats=repeats)
+    store_results(out, "latency", rows, latency_table(rows), threads=threads, repeats=repeats)
 
 
 @app.command()
@@ -156,7 +157,7 @@ def doorways(
         )
     table = doorways_table(rows, has_weights=weights is not None)
     name = f"untrained {network}" if weights is None else weights.name
-    store_and_print(out, "doorways", rows, table, weights=name, threads=threads, repeats=repeats)
+    store_results(out, "doorways", rows, table, weights=name, threads=threads, repeats=repeats)
 
 
 @app.command()
@@ -183,9 +184,7 @@ def busy(
     numbers_of_busy = parse_integers("processes", processes, 0)
     with progress_bar("busy") as progress:
         rows = measure_busy(network, names, numbers_of_threads, numbers_of_busy, repeats, progress)
-    store_and_print(
-        out, "busy", rows, busy_table(rows), network=network, processes=processes, repeats=repeats
-    )
+    store_results(out, "busy", rows, busy_table(rows), network=network, processes=processes, repeats=repeats)
 
 
 @app.command()
@@ -202,7 +201,7 @@ def rules(
 
     with progress_bar("rules") as progress:
         rows = measure_rules(count, points, threads, repeats, progress)
-    store_and_print(out, "rules", rows, rules_table(rows), clouds=count, threads=threads, repeats=repeats)
+    store_results(out, "rules", rows, rules_table(rows), clouds=count, threads=threads, repeats=repeats)
 
 
 @app.command()
@@ -225,7 +224,7 @@ def profile(
     clouds = simulated_clouds(batch, points).first_points(points)
     with progress_bar("profile") as progress:
         rows = measure_profile(names, profiled_forms(form), clouds, batch, threads, progress)
-    store_and_print(
+    store_results(
         out, "profile", rows, profile_table(rows, batch), points=points, batch=batch, threads=threads
     )
 
@@ -241,7 +240,7 @@ def knn(out: Out, points: Points = _ALL_POINTS, repeats: Repeats = 5, threads: T
     with progress_bar("knn") as progress:
         clouds = simulated_clouds(1, max(numbers_of_points))
         rows = measure_neighbours(clouds, numbers_of_points, repeats, threads, progress)
-    store_and_print(out, "knn", rows, neighbours_table(rows), threads=threads, repeats=repeats)
+    store_results(out, "knn", rows, neighbours_table(rows), threads=threads, repeats=repeats)
 
 
 @app.command()
@@ -270,7 +269,7 @@ def service(
     options += [] if points is None else ["--points", str(points)]
     with progress_bar("service") as progress:
         rows = measure_service(numbers_of_clients, seconds, options, progress)
-    store_and_print(
+    store_results(
         out,
         "service",
         rows,
@@ -287,14 +286,9 @@ def main() -> None:
     try:
         app(prog_name="python -m benchmarks")
     except DoorstateError as error:
-        sys.exit(f"benchmarks: {error.describe(_write_option)}")
+        sys.exit(f"benchmarks: {error.describe(write_option)}")
     except KeyboardInterrupt:
         sys.exit("benchmarks: stopped; the same command continues after the last finished network")
-
-
-def _write_option(name: str, value: object) -> str:
-    option = f"--{name.replace('_', '-')}"
-    return option if value is None else f"{option} {value}"
 
 
 if __name__ == "__main__":

@@ -59,7 +59,7 @@ def describe_run(**options: Any) -> dict[str, Any]:
     return describe_environment() | options
 
 
-def store_and_print(out: Path, name: str, rows: list[dict[str, Any]], table: Table, **options: Any) -> None:
+def store_results(out: Path, name: str, rows: list[dict[str, Any]], table: Table, **options: Any) -> None:
     """Store and print the results of a benchmark that is measured as a whole."""
     from benchmarks.store import save_rows
 
@@ -75,3 +75,8 @@ def print_stored(table: Table, path: Path, remarks: Sequence[str] = ()) -> None:
     for remark in remarks:
         stdout.print(remark, soft_wrap=True)
     stdout.print(f"stored in {path} and {path.with_suffix('.json').name}", soft_wrap=True)
+
+
+def write_option(name: str, value: object) -> str:
+    option = f"--{name.replace('_', '-')}"
+    return option if value is None else f"{option} {value}"

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -99,10 +99,9 @@ def evaluate(
         group = _DOOR_COLUMN
     for column in (*(by or ()), *([group] if group else ())):
         check_column(frames, column.partition(":")[0])
-    with ExitStack() as stack:
-        if out is not None:
-            check_writable(out / PAGE)
-            stack.enter_context(owned_folder(out))
+    if out is not None:
+        check_writable(out / PAGE)
+    with nullcontext() if out is None else owned_folder(out):
         predictors = load_predictors(
             Methods(network, weights, rule), points, budget_ms=budget_ms, threads=threads
         )
