@@ -19,8 +19,8 @@ from benchmarks.options import (
     parse_points,
     print_stored,
     store_results,
-    write_option,
 )
+from doorstate.cli.flags import format_flag
 from doorstate.errors import ConfigError, DoorstateError
 
 if TYPE_CHECKING:
@@ -286,7 +286,7 @@ def main() -> None:
     try:
         app(prog_name="python -m benchmarks")
     except DoorstateError as error:
-        sys.exit(f"benchmarks: {error.describe(write_option)}")
+        sys.exit(f"benchmarks: {error.describe(format_flag)}")
     except KeyboardInterrupt:
         sys.exit("benchmarks: stopped; the same command continues after the last finished network")
 

@@ -75,8 +75,3 @@ def print_stored(table: Table, path: Path, remarks: Sequence[str] = ()) -> None:
     for remark in remarks:
         stdout.print(remark, soft_wrap=True)
     stdout.print(f"stored in {path} and {path.with_suffix('.json').name}", soft_wrap=True)
-
-
-def write_option(name: str, value: object) -> str:
-    option = f"--{name.replace('_', '-')}"
-    return option if value is None else f"{option} {value}"
