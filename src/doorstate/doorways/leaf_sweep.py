@@ -26,12 +26,32 @@ _LEAF_LEVELS, _ABOVE_LEVEL, _NUM_LEVELS = 6, 7, 8  # 0.1 to 1.9 m, and 2.2 to 2.
 _STARTS, _STOPS = 0.3, 0.95  # of the leaf's width: beyond the reveal beside the hinge
 _STEPS = 8
 _BEYOND_M = (0.15, 0.25)  # of the free edge
+_GOES_ON = 0.5  # of the cells in view beyond or above the leaf: a wall
 _BESIDE = 2  # angles on each side of that of a wall
 _WALL_M = (-0.25, 0.15)  # beside the opening: the wall itself, which a leaf folded back lies on
 MIN_WIDTH_M = 0.55  # of one leaf of double doors
 _MIN_CELLS = 10  # of the leaf, in view
 _MIN_SHARE = 0.7  # of the cells of a leaf in view that were measured
 _OUTER, _MIN_OUTER_CELLS = 4, 5  # outer steps of the leaf, and least cells in view there: reveals have none
+
+
+def _cells_by_part() -> NDArray[np.bool_]:
+    """Return which cells (part, step, level) belong to the leaf, its outer part, beyond its free edge and above it."""
+    step = np.arange(_STEPS + len(_BEYOND_M))[:, None]
+    level = np.arange(_NUM_LEVELS)
+    is_along, is_level = step < _STEPS, level < _LEAF_LEVELS
+    is_outer = step >= _STEPS - _OUTER
+    return np.stack(
+        [
+            is_along & is_level,
+            is_along & is_outer & is_level,
+            ~is_along & is_level,
+            is_along & (level == _ABOVE_LEVEL),
+        ]
+    )
+
+
+_PARTS = _cells_by_part()
 
 
 class SeenLeaf(NamedTuple):
@@ -74,23 +94,17 @@ def _best_leaf(
     # From the hinge at one end towards the other, turned by the angle; y is towards the camera.
     x = hinges[..., None] * (doorway.width_m / 2 - along * np.cos(angles)[..., None])
     y = swings[..., None] * along * np.sin(angles)[..., None]
-    levels = np.arange(_NUM_LEVELS)
-    is_leaf = (np.arange(len(along)) < _STEPS)[:, None] & (levels < _LEAF_LEVELS)
-    is_beyond = (np.arange(len(along)) >= _STEPS)[:, None] & (levels < _LEAF_LEVELS)
-    is_above = (np.arange(len(along)) < _STEPS)[:, None] & (levels == _ABOVE_LEVEL)
     places = np.stack([x, y, np.zeros_like(x)], axis=-1).astype(np.float32)
-    heights_m = _LOWEST_M + (levels + 0.5) * _LEVEL_M + doorway.floor_z_m
+    heights_m = _LOWEST_M + (np.arange(_NUM_LEVELS) + 0.5) * _LEVEL_M + doorway.floor_z_m
     in_view = reach.includes(doorway.to_sensor(places), heights_m.astype(np.float32))
     beside = (np.abs(x) > doorway.width_m / 2) & (y > _WALL_M[0]) & (y < _WALL_M[1])
     in_view &= ~beside[..., None]
     filled = _look_up(occupied, x, y) & in_view
-    is_outer = is_leaf & (np.arange(len(along)) >= _STEPS - _OUTER)[:, None]
-    parts = np.stack([is_leaf, is_outer, is_beyond, is_above])
-    leaf, outer, *_ = totals = _counts(in_view, parts)
-    shares_of = _counts(filled, parts) / np.maximum(totals, 1)
-    is_enough = (leaf >= _MIN_CELLS) & (outer >= _MIN_OUTER_CELLS)
-    shares = np.where(is_enough, np.minimum(shares_of[0], shares_of[1]), 0.0)
-    goes_on = (shares_of[2] > 0.5) | (shares_of[3] > 0.5)
+    totals = _counts(in_view, _PARTS)
+    leaf, outer, beyond, above = _counts(filled, _PARTS) / np.maximum(totals, 1)
+    is_enough = (totals[0] >= _MIN_CELLS) & (totals[1] >= _MIN_OUTER_CELLS)
+    shares = np.where(is_enough, np.minimum(leaf, outer), 0.0)
+    goes_on = (beyond > _GOES_ON) | (above > _GOES_ON)
     shares[_widened(goes_on)] = 0.0
     hinge, swing, first = (int(index) for index in np.unravel_index(int(shares.argmax()), shares.shape))
     if shares[hinge, swing, first] == 0:
