@@ -11,8 +11,10 @@ import subprocess
 import sys
 import threading
 from pathlib import Path
+from typing import Any
 
 import pytest
+from filelock import FileLock
 
 from doorstate import _locks
 from doorstate._files import is_vacant
@@ -22,6 +24,7 @@ from doorstate.errors import DoorstateError, FolderInUseError, OutputError
 HOLD = """
 import sys, time
 from pathlib import Path
+from typing import Any
 from doorstate._locks import owned_folder
 with owned_folder(Path(sys.argv[1]), sys.argv[2]):
     print("held", flush=True)
@@ -100,6 +103,22 @@ def test_a_new_folder_without_files_is_removed(tmp_path: Path) -> None:
     with owned_folder(tmp_path / "old"):
         pass
     assert (tmp_path / "old").is_dir()
+
+
+def test_an_interrupted_lock_leaves_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    acquire = FileLock.acquire
+
+    def interrupted(lock: FileLock, **options: Any) -> None:
+        monkeypatch.setattr(FileLock, "acquire", acquire)
+        Path(lock.lock_file).touch()
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(FileLock, "acquire", interrupted)
+    with pytest.raises(KeyboardInterrupt), owned_folder(tmp_path):
+        pass
+    assert list(tmp_path.iterdir()) == []
+    with owned_folder(tmp_path):
+        assert len(list(tmp_path.iterdir())) == 2
 
 
 def test_temporary_files_of_killed_processes_are_removed(tmp_path: Path) -> None:

@@ -79,8 +79,13 @@ def _lock(folder: Path, suffix: str) -> Iterator[None]:
         yield
     except Timeout as error:
         raise _in_use(folder, owner) from error
+    except BaseException:
+        if not lock.is_locked:  # an `acquire` that an interrupt ended leaves its file
+            with suppress(Timeout, OSError):
+                lock.acquire(timeout=0)
+        raise
     finally:
-        if lock.is_locked:  # also by an `acquire` that an interrupt ended
+        if lock.is_locked:
             if is_outermost:
                 # Removed while held: a process that has opened the file meanwhile finds it unlinked, and opens another.
                 owner.unlink(missing_ok=True)

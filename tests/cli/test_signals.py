@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 
 _HEAD = """
-import gc, importlib, os, signal, sys, time
+import os, signal, sys, time
+from pathlib import Path
 from doorstate.cli.signals import Terminated, handle_signals, leave_signals, raise_in
 
 signal.signal(signal.SIGINT, signal.default_int_handler)  # the child of a background job ignores it
@@ -37,7 +38,6 @@ def work():
 main(work)
 """,
     "an import": """
-from pathlib import Path
 sys.path.insert(0, os.getcwd())
 Path("swallows.py").write_text('''
 import __main__
@@ -73,6 +73,22 @@ def work():
         interrupt()
     except BaseException as error:
         raise ValueError("callback failed") from error
+main(work)
+""",
+    "the start of workers": """
+from multiprocessing.process import BaseProcess
+from doorstate._jobs import run_pieces
+start = BaseProcess.start
+def start_and_interrupt(process):
+    BaseProcess.start = start
+    start(process)
+    interrupt()
+BaseProcess.start = start_and_interrupt
+def work():
+    try:
+        run_pieces(os.path.join, ["a", "b"], [Path("a"), Path("b")], workers=2)
+    finally:
+        print("cleaned up")
 main(work)
 """,
     "a callback at exit": """

@@ -24,6 +24,7 @@ _WORDS = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
 _DEFAULTS = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
 _CAN_WAIT = hasattr(signal, "setitimer")  # not on Windows
 _PAUSE_S = 0.01
+_STARTS = {("multiprocessing.process", "start"), ("concurrent.futures.process", "submit")}
 _SHOW_CURSOR = b"\x1b[?25h"
 
 
@@ -118,12 +119,15 @@ def _raise_later(number: int) -> None:
 
 
 def _is_fragile(frame: FrameType | None) -> bool:
-    """Return True within an import, which may swallow the exception or raise another, and the start of a worker."""
+    """Return True within an import, which may swallow the exception or raise another, and the start of workers.
+
+    A worker whose start is not completed prints a traceback, and one that its pool does not know yet is not waited for.
+    """
     while frame is not None:
         if frame.f_code.co_filename.startswith("<frozen importlib"):
             return True
-        if frame.f_globals.get("__name__") == "multiprocessing.popen_spawn_posix":
-            return True  # a worker whose start is not completed prints a traceback
+        if (frame.f_globals.get("__name__"), frame.f_code.co_name) in _STARTS:
+            return True
         frame = frame.f_back
     return False
 
