@@ -75,6 +75,18 @@ def work():
         raise ValueError("callback failed") from error
 main(work)
 """,
+    "a library that drops the error": """
+def work():
+    try:
+        try:
+            interrupt()
+        except BaseException:
+            pass
+        time.sleep(60)
+    finally:
+        print("cleaned up")
+main(work)
+""",
     "the start of workers": """
 from multiprocessing.process import BaseProcess
 from doorstate._jobs import run_pieces

@@ -28,8 +28,20 @@ _STARTS = {("multiprocessing.process", "start"), ("concurrent.futures.process", 
 _SHOW_CURSOR = b"\x1b[?25h"
 
 
-class Terminated(BaseException):
+class _Raised(BaseException):
+    """Exception of a signal. C code may drop it, as of a comparison that was interrupted: then it is raised again."""
+
+    def __del__(self) -> None:
+        if _State.raises and _State.received is not None:
+            _raise_later(_State.received)
+
+
+class Terminated(_Raised):
     """SIGTERM, raised in the main thread as KeyboardInterrupt is."""
+
+
+class _Interrupted(_Raised, KeyboardInterrupt):
+    """SIGINT."""
 
 
 class _State:
@@ -108,7 +120,7 @@ def _raise(number: int, frame: FrameType | None) -> None:
     if _is_fragile(frame):
         _raise_later(number)
     elif _State.raises:  # else the work ended meanwhile
-        raise KeyboardInterrupt if number == signal.SIGINT else Terminated
+        raise _Interrupted if number == signal.SIGINT else Terminated
 
 
 def _raise_later(number: int) -> None:

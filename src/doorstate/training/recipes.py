@@ -84,8 +84,8 @@ class Recipe(FrozenModel):
 # searched once per cloud. Mirrored and scaled doors do not occur in `ogurob`, and learning them too took PointNet
 # more than twice as long (docs/adr/0005).
 COMMON = Recipe(name="common", augmentation=Augmentation(yaw_deg=15.0))
-# The finder's errors are in the crops already, and a doorway's frame has no direction of view to be turned from. Shifts of
-# up to 18 cm did not make the head `frame` correct larger errors, and made its usual error twice as large (paper/log.md).
+# The finder's errors are in the crops already, and a doorway's frame has no direction of view to be turned from. Shifts
+# of up to 18 cm did not make the head `frame` correct larger errors, and doubled its usual error (paper/log.md).
 DOORWAYS = Recipe(
     name="doorways",
     no_door_share=0.4,
