@@ -99,7 +99,9 @@ def files(suffix: str) -> tuple[bytes, ...]:
     )
     odd = [count + rows, named, decimal, decimal.replace(b";", b" "), spelled, quoted]
     return tuple(
-        plain + odd + [rows.replace(b"\n", b"\r"), rows.decode().encode("utf-16"), gzip.compress(rows)]
+        plain
+        + odd
+        + [rows.replace(b"\n", b"\r"), rows.decode().encode("utf-16"), gzip.compress(rows, mtime=0)]
     )
 
 
@@ -110,7 +112,7 @@ def _odd_pcd() -> list[bytes]:
     sizes = re.sub(rb"(SIZE|TYPE|COUNT) .*\n", b"", text)
     empty = binary.replace(b"x y z", b"_ x y z").replace(b"SIZE 4", b"SIZE 1 4")
     empty = empty.replace(b"TYPE F", b"TYPE U F").replace(b"COUNT 1", b"COUNT 0 1")
-    return [columns, sizes, empty, text.replace(b"\n", b"\r"), gzip.compress(binary)]
+    return [columns, sizes, empty, text.replace(b"\n", b"\r"), gzip.compress(binary, mtime=0)]
 
 
 def _ply_of_lists(kind: str) -> bytes:
@@ -167,7 +169,13 @@ def bodies() -> tuple[bytes, ...]:
     name = 'Content-Disposition: form-data; name="file"; filename="cloud.npy"'
     file = saved(lambda stream: np.save(stream, SCENE))
     form = f"--edge\r\n{name}\r\n\r\n".encode() + file + b"\r\n--edge--\r\n"
-    return (file, form, gzip.compress(file), gzip.compress(form), form.replace(file, gzip.compress(file)))
+    return (
+        file,
+        form,
+        gzip.compress(file, mtime=0),
+        gzip.compress(form, mtime=0),
+        form.replace(file, gzip.compress(file, mtime=0)),
+    )
 
 
 BODY_HEADERS: tuple[dict[str, str], ...] = (

@@ -68,9 +68,9 @@ _REPEATED_COLUMNS = (
         ("rows.csv", b"sample_id,scene\na," + b"[" * 100_000),
         ("rows.csv", b"sample_id,camera,camera.width\na,b,640"),
         ("data/manifest.csv", b"sample_id,state\na,open\na,open\nb,closed\n"),
-        ("predictions.csv.gz", gzip.compress(b"fold\n" + b"9" * 30)),
-        ("predictions.csv.gz", gzip.compress(b"fold\n1,2,3\n")),
-        ("predictions.csv.gz", gzip.compress(_REPEATED_COLUMNS)),
+        ("predictions.csv.gz", gzip.compress(b"fold\n" + b"9" * 30, mtime=0)),
+        ("predictions.csv.gz", gzip.compress(b"fold\n1,2,3\n", mtime=0)),
+        ("predictions.csv.gz", gzip.compress(_REPEATED_COLUMNS, mtime=0)),
         (
             "metrics.json",
             b'{"runs": [{"method": "pointnet", "fold": -9, "metrics": {}, "environment": {}, "log": {}}]}',
