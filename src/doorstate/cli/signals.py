@@ -99,6 +99,11 @@ def raise_in(work: Callable[[], Result], advice: str = "") -> Result:
     raise SystemExit(128 + number)
 
 
+def accept_signal() -> None:
+    """Go on after the exception of a signal that was caught, which would be raised again otherwise."""
+    _State.received = None
+
+
 def _handle(number: int, frame: FrameType | None) -> None:
     leave_signals()  # a second one need not wait for the interpreter
     if not _State.raises:

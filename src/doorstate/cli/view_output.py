@@ -16,6 +16,7 @@ from doorstate.cli.console import stderr
 from doorstate.cli.flags import format_flag
 from doorstate.cli.prediction_summary import print_errors
 from doorstate.cli.progress import progress_bar
+from doorstate.cli.signals import accept_signal
 
 if TYPE_CHECKING:
     from doorstate.inference.predictor import Predictor
@@ -100,6 +101,7 @@ def show_live(
             while True:
                 time.sleep(0.5)
         except KeyboardInterrupt:
+            accept_signal()
             stderr.print("stopped")
 
 
