@@ -178,7 +178,7 @@ def _predictor(backend: Backend, weights: Path | None) -> DoorwayPredictor:
 
 @contextmanager
 def _best_candidates(number: int) -> Iterator[None]:
-    """Let predictors search for so many candidates within the block, however improbable."""
+    """Let predictors take the `number` best candidates within the block, however improbable."""
     settings = FinderSettings(most=number, min_score=0.0)
     with patch.object(doorway_predictor, "find_doorways", partial(find_doorways, settings=settings)):
         yield

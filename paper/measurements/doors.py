@@ -10,6 +10,7 @@ import pandas as pd
 
 from doorstate._jobs import Progress
 from doorstate.dataset.crops import HIT_M
+from doorstate.doorways.doorway import gap
 from doorstate.errors import ConfigError
 from doorstate.evaluation.table import Table, count_column, label_column, number_column, text_column
 from doorstate.inference.doorway_predictor import DoorwayPredictor
@@ -23,7 +24,7 @@ from .doorways import (
     SOURCES,
     VISIBLE_PX,
     View,
-    gap_to,
+    by_source,
     nearest,
     simulated_views,
     visible_doors,
@@ -112,7 +113,7 @@ def found_door(view: View, door: TrueDoor, prediction: Prediction) -> FoundDoor:
         abstention = of_frame if refused is None else refused.abstention
         return FoundDoor(*start, None, None, "no candidate" if abstention is None else abstention.code)
     reason = "" if answer.abstention is None else answer.abstention.code
-    return FoundDoor(*start, gap_to(door, answer)[0], answer.state, reason)
+    return FoundDoor(*start, gap(door, answer)[0], answer.state, reason)
 
 
 def answered_frame(view: View, prediction: Prediction) -> AnsweredFrame:
@@ -126,18 +127,15 @@ def answered_frame(view: View, prediction: Prediction) -> AnsweredFrame:
 def doors_table(doors: Sequence[FoundDoor], frames: Sequence[AnsweredFrame]) -> Table:
     """Return one row per preset and sensor: places and states of the doors, and false ones."""
     lines = []
-    all_doors, all_frames = _frame_of(FoundDoor, doors), _frame_of(AnsweredFrame, frames)
-    for (preset, sensor), answered in all_frames.groupby(["preset", "sensor"], sort=False):
-        of_doors = all_doors[(all_doors["preset"] == preset) & (all_doors["sensor"] == sensor)]
+    results = _frame_of(FoundDoor, doors), _frame_of(AnsweredFrame, frames)
+    for source, of_doors, answered in by_source(*results):
         error_m = of_doors["position_error_m"].dropna()
         found = of_doors.loc[error_m.index]
         with_state = found[found["predicted"].notna()]
         is_right = with_state["predicted"] == with_state["state"]
         lines.append(
-            {
-                "preset": preset,
-                "sensor": sensor,
-                "doors": len(of_doors),
+            source
+            | {
                 "found": of_doors["position_error_m"].notna().mean(),
                 "exact": (error_m <= _EXACT_M).mean(),
                 "median": error_m.median() * 100,

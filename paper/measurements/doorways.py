@@ -6,15 +6,15 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterable, Iterator, Sequence
-from typing import NamedTuple, Protocol, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import pandas as pd
 
 from doorstate._jobs import Progress
 from doorstate.clouds.floor import find_floor_z_m
 from doorstate.clouds.outliers import remove_outliers
-from doorstate.dataset.crops import HIT_DEG, HIT_M
-from doorstate.doorways.doorway import Doorway
+from doorstate.dataset.crops import HIT_DEG, HIT_M, is_hit
+from doorstate.doorways.doorway import Doorway, Placed, gap
 from doorstate.doorways.finder import find_doorways
 from doorstate.evaluation.table import Table, count_column, label_column, number_column
 from doorstate.simulation.frames import Frame
@@ -33,17 +33,6 @@ SOURCES: tuple[Source, ...] = tuple(
 )
 VISIBLE_PX = 1500  # of a door that should be found
 _EXACT_M, _EXACT_DEG = 0.08, 4.0
-
-
-class Placed(Protocol):
-    """Candidate or answer with a place in the level sensor frame."""
-
-    @property
-    def x_m(self) -> float: ...
-    @property
-    def y_m(self) -> float: ...
-    @property
-    def yaw_deg(self) -> float: ...
 
 
 AnyPlaced = TypeVar("AnyPlaced", bound=Placed)
@@ -110,16 +99,10 @@ def _seen_px(door: TrueDoor, range_m: float) -> int:
     return seen.leaf + seen.frame + (seen.opening if door.x_m <= range_m else 0)
 
 
-def gap_to(door: TrueDoor, place: Placed) -> tuple[float, float]:
-    """Return the distance in metres from a door to a place, and the angle in degrees between their walls."""
-    turn_deg = abs(math.remainder(place.yaw_deg - door.yaw_deg, 360))
-    return math.hypot(place.x_m - door.x_m, place.y_m - door.y_m), turn_deg
-
-
 def nearest(door: TrueDoor, places: Iterable[AnyPlaced]) -> AnyPlaced | None:
     """Return the place nearest to a door, of those within 0.35 m; None if there is none."""
-    near = [place for place in places if gap_to(door, place)[0] <= HIT_M]
-    return min(near, key=lambda place: gap_to(door, place)[0], default=None)
+    near = [place for place in places if gap(door, place)[0] <= HIT_M]
+    return min(near, key=lambda place: gap(door, place)[0], default=None)
 
 
 def measure_doorways(scenes: int, progress: Progress) -> tuple[list[DoorResult], list[FrameResult]]:
@@ -144,15 +127,11 @@ def measure_doorways(scenes: int, progress: Progress) -> tuple[list[DoorResult],
 
 def doorways_table(doors: Sequence[DoorResult], frames: Sequence[FrameResult]) -> Table:
     """Return recall, candidates and time by preset and sensor."""
-    found, looked = pd.DataFrame(doors), pd.DataFrame(frames)
     lines = []
-    for (preset, sensor), part in looked.groupby(["preset", "sensor"], sort=False):
-        of_doors = found[(found["preset"] == preset) & (found["sensor"] == sensor)]
+    for source, of_doors, part in by_source(pd.DataFrame(doors), pd.DataFrame(frames)):
         lines.append(
-            {
-                "preset": preset,
-                "sensor": sensor,
-                "doors": len(of_doors),
+            source
+            | {
                 "near": of_doors["is_near"].mean(),
                 "exact": of_doors["is_exact"].mean(),
                 "first": of_doors["is_first"].mean(),
@@ -177,10 +156,19 @@ def doorways_table(doors: Sequence[DoorResult], frames: Sequence[FrameResult]) -
     )
 
 
+def by_source(
+    doors: pd.DataFrame, frames: pd.DataFrame
+) -> Iterator[tuple[dict[str, Any], pd.DataFrame, pd.DataFrame]]:
+    """Yield preset and sensor as columns of a table, and the doors and frames of each."""
+    for (preset, sensor), of_frames in frames.groupby(["preset", "sensor"], sort=False):
+        of_doors = doors[(doors["preset"] == preset) & (doors["sensor"] == sensor)]
+        yield {"preset": preset, "sensor": sensor, "doors": len(of_doors)}, of_doors, of_frames
+
+
 def _door_result(preset: str, sensor: str, door: TrueDoor, candidates: Sequence[Doorway]) -> DoorResult:
-    errors = [gap_to(door, candidate) for candidate in candidates]
-    near = [place_m <= HIT_M and turn_deg <= HIT_DEG for place_m, turn_deg in errors]
-    exact = [place_m <= _EXACT_M and turn_deg <= _EXACT_DEG for place_m, turn_deg in errors]
+    near = [is_hit(door, candidate) for candidate in candidates]
+    gaps = [gap(door, candidate) for candidate in candidates]
+    exact = [place_m <= _EXACT_M and turn_deg <= _EXACT_DEG for place_m, turn_deg in gaps]
     return DoorResult(
         preset=preset,
         sensor=sensor,

@@ -16,7 +16,7 @@ import numpy as np
 from doorstate._models import FrozenModel
 from doorstate.clouds.floor import find_floor_z_m
 from doorstate.clouds.outliers import remove_outliers
-from doorstate.doorways.doorway import Doorway
+from doorstate.doorways.doorway import Doorway, gap
 from doorstate.doorways.finder import FINDER_ERRORS, find_doorways
 from doorstate.simulation.manifest import flatten, unflatten
 from doorstate.simulation.noise.streams import sample_seed, stage_rng
@@ -78,8 +78,8 @@ def recorded_columns(row: Columns, doorway: Doorway) -> Columns:
 
 def hit_door(row: Row, doorway: Doorway) -> TrueDoor | None:
     """Return the nearest door whose middle is within 0.35 m of a candidate's and whose wall within 20 degrees."""
-    hits = [door for door in true_doors(row) if _is_hit(door, doorway)]
-    return min(hits, key=lambda door: doorway.gap_to(door.x_m, door.y_m, door.yaw_deg)[0], default=None)
+    hits = [door for door in true_doors(row) if is_hit(door, doorway)]
+    return min(hits, key=lambda door: gap(door, doorway)[0], default=None)
 
 
 def frame_line(line: Columns) -> Columns:
@@ -110,7 +110,7 @@ def _missed(row: Row, candidates: Sequence[Doorway]) -> list[tuple[Doorway, True
         along_m, across_m, turn_deg = (
             float(sigma * np.clip(rng.normal(), -_MOST_SIGMAS, _MOST_SIGMAS)) for sigma in FINDER_ERRORS
         )
-        if door.visible_px.total < least_px or any(_is_hit(door, doorway) for doorway in candidates):
+        if door.visible_px.total < least_px or any(is_hit(door, doorway) for doorway in candidates):
             continue
         yaw = math.radians(door.yaw_deg)
         doorway = Doorway(
@@ -159,6 +159,7 @@ def _text(value: object) -> str:
     return "" if value is None else str(value)
 
 
-def _is_hit(door: TrueDoor, doorway: Doorway) -> bool:
-    distance_m, turn_deg = doorway.gap_to(door.x_m, door.y_m, door.yaw_deg)
+def is_hit(door: TrueDoor, doorway: Doorway) -> bool:
+    """Return True if a candidate's middle is within 0.35 m of a door's, and its wall within 20 degrees."""
+    distance_m, turn_deg = gap(door, doorway)
     return distance_m <= HIT_M and turn_deg <= HIT_DEG

@@ -5,12 +5,29 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from doorstate.clouds.coordinates import coordinates
 from doorstate.types import Points
+
+
+class Placed(Protocol):
+    """Opening with a place in the level sensor frame: a candidate, a door or a true one."""
+
+    @property
+    def x_m(self) -> float:
+        """Middle of the opening."""
+
+    @property
+    def y_m(self) -> float:
+        """Middle of the opening."""
+
+    @property
+    def yaw_deg(self) -> float:
+        """Direction of the wall."""
 
 
 @dataclass(frozen=True)
@@ -34,10 +51,6 @@ class Doorway:
         """Distance from the camera to the middle of the opening in plan view."""
         return math.hypot(self.x_m, self.y_m)
 
-    def gap_to(self, x_m: float, y_m: float, yaw_deg: float) -> tuple[float, float]:
-        """Return the distance in metres to another opening's middle, and the angle in degrees to its wall."""
-        return math.hypot(self.x_m - x_m, self.y_m - y_m), abs(math.remainder(self.yaw_deg - yaw_deg, 360))
-
     def to_doorway(self, points: Points) -> Points:
         """Return points (..., 3) of the sensor frame in the doorway's frame, float32."""
         moved = coordinates(points) - np.array([[self.x_m], [self.y_m], [self.floor_z_m]], np.float32)
@@ -53,3 +66,9 @@ class Doorway:
         """Return the axes of the doorway's frame as rows (3, 3) in the sensor frame."""
         cos, sin = math.cos(math.radians(self.yaw_deg)), math.sin(math.radians(self.yaw_deg))
         return np.array([[cos, sin, 0], [-sin, cos, 0], [0, 0, 1]], np.float32)
+
+
+def gap(first: Placed, second: Placed) -> tuple[float, float]:
+    """Return the distance in metres between the middles of two openings, and the angle in degrees of their walls."""
+    turn_deg = abs(math.remainder(first.yaw_deg - second.yaw_deg, 360))
+    return math.hypot(first.x_m - second.x_m, first.y_m - second.y_m), turn_deg

@@ -16,7 +16,7 @@ from doorstate.clouds.coordinates import coordinates
 from doorstate.clouds.floor import lowest_z_m
 from doorstate.clouds.measured import is_measured
 from doorstate.doorways.column_scorer import ColumnScores, score_columns
-from doorstate.doorways.doorway import Doorway
+from doorstate.doorways.doorway import Doorway, gap
 from doorstate.doorways.elevation import COLUMN_M, Elevation, SightLines, wall_elevation
 from doorstate.doorways.plan_lines import Floats
 from doorstate.doorways.walls import Wall, find_walls
@@ -153,6 +153,6 @@ def _peaks(probability: Floats, min_score: float) -> list[int]:
 
 
 def _are_one(first: Doorway, second: Doorway) -> bool:
-    distance_m, turn_deg = first.gap_to(second.x_m, second.y_m, second.yaw_deg)
+    distance_m, turn_deg = gap(first, second)
     # The two faces of a thin wall differ by half a turn.
     return distance_m <= _SAME_M and min(turn_deg, 180 - turn_deg) <= _SAME_DEG

@@ -200,7 +200,7 @@ def _best_columns(along_m: Floats, depths_m: Floats) -> NDArray[np.bool_] | None
 
 @lru_cache(maxsize=64)
 def _pairs(count: int) -> tuple[Indices, Indices]:
-    """Return both columns of the pairs that are tried, of all pairs of so many columns."""
+    """Return the pairs of `count` columns that are tried, as the numbers of their first and second columns."""
     first, second = np.triu_indices(count, 1)
     step = max(1, len(first) * count // _MAX_TRIALS)
     return first[::step], second[::step]

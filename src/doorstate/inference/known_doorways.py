@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from doorstate.clouds.measured import is_measured
-from doorstate.doorways.doorway import Doorway
+from doorstate.doorways.doorway import Doorway, gap
 from doorstate.errors import ConfigError
 from doorstate.inference.known import USUAL_WIDTH_M, DoorHint, ImageBox
 from doorstate.inference.seen_through import Opening
@@ -65,7 +65,7 @@ def _towards_camera(x_m: float, y_m: float, yaw_deg: float) -> float:
 
 
 def _is_near(candidate: Doorway, place: Doorway, has_yaw: bool) -> bool:
-    gap_m, turn_deg = candidate.gap_to(place.x_m, place.y_m, place.yaw_deg)
+    gap_m, turn_deg = gap(candidate, place)
     return gap_m <= _NEAR_M and (not has_yaw or turn_deg <= _NEAR_DEG)
 
 
