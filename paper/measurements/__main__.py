@@ -77,11 +77,11 @@ def doorways(
     """Count doors of simulated frames that are among the candidate doorways."""
     from doorstate.cli.progress import progress_bar
 
-    from .doorways import doorways_table, measure_doorways
+    from .doorways import doorways_table, errors_table, measure_doorways
 
     with progress_bar("doorways") as progress:
-        doors, frames = measure_doorways(scenes, progress)
-    _write((doorways_table(doors, frames),), out / "doorway-candidates.md", scenes=scenes)
+        doors, frames, hits = measure_doorways(scenes, progress)
+    _write((doorways_table(doors, frames), errors_table(hits)), out / "doorway-candidates.md", scenes=scenes)
 
 
 @app.command()

@@ -8,12 +8,14 @@ import time
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, NamedTuple, TypeVar
 
+import numpy as np
 import pandas as pd
 
 from doorstate._jobs import Progress
 from doorstate.clouds.floor import find_floor_z_m
 from doorstate.clouds.outliers import remove_outliers
 from doorstate.dataset.crops import HIT_DEG, HIT_M, is_hit
+from doorstate.doorways.candidate_errors import ONE_SIGMA
 from doorstate.doorways.doorway import Doorway, Placed, gap
 from doorstate.doorways.finder import find_doorways
 from doorstate.evaluation.table import Table, count_column, label_column, number_column
@@ -57,6 +59,16 @@ class DoorResult(NamedTuple):
     is_exact: bool
     is_near: bool
     is_first: bool  # the best candidate is the near one
+
+
+class CandidateResult(NamedTuple):
+    """One candidate that hits a visible door, and its errors, all of them positive."""
+
+    score: float
+    along_m: float
+    across_m: float
+    yaw_deg: float
+    width_m: float
 
 
 class FrameResult(NamedTuple):
@@ -105,8 +117,10 @@ def nearest(door: TrueDoor, places: Iterable[AnyPlaced]) -> AnyPlaced | None:
     return min(near, key=lambda place: gap(door, place)[0], default=None)
 
 
-def measure_doorways(scenes: int, progress: Progress) -> tuple[list[DoorResult], list[FrameResult]]:
-    """Return the results of all visible doors and of all frames.
+def measure_doorways(
+    scenes: int, progress: Progress
+) -> tuple[list[DoorResult], list[FrameResult], list[CandidateResult]]:
+    """Return the results of all visible doors, of all frames, and of all candidates that hit such a door.
 
     Args:
         scenes: scenes of each preset and sensor.
@@ -114,6 +128,7 @@ def measure_doorways(scenes: int, progress: Progress) -> tuple[list[DoorResult],
     """
     doors: list[DoorResult] = []
     frames: list[FrameResult] = []
+    hits: list[CandidateResult] = []
     for preset, sensor, row, frame in simulated_views(SOURCES, scenes, progress):
         cloud = remove_outliers(frame.points).points
         floor_m = find_floor_z_m(cloud)
@@ -121,8 +136,10 @@ def measure_doorways(scenes: int, progress: Progress) -> tuple[list[DoorResult],
         candidates = find_doorways(cloud, floor_m)
         milliseconds = (time.process_time() - started) * 1000
         frames.append(FrameResult(preset, sensor, len(candidates), milliseconds))
-        doors += (_door_result(preset, sensor, door, candidates) for door in visible_doors(row))
-    return doors, frames
+        for door in visible_doors(row):
+            doors.append(_door_result(preset, sensor, door, candidates))
+            hits += (_errors(door, candidate) for candidate in candidates if is_hit(door, candidate))
+    return doors, frames, hits
 
 
 def doorways_table(doors: Sequence[DoorResult], frames: Sequence[FrameResult]) -> Table:
@@ -163,6 +180,35 @@ def by_source(
     for (preset, sensor), of_frames in frames.groupby(["preset", "sensor"], sort=False):
         of_doors = doors[(doors["preset"] == preset) & (doors["sensor"] == sensor)]
         yield {"preset": preset, "sensor": sensor, "doors": len(of_doors)}, of_doors, of_frames
+
+
+def errors_table(hits: Sequence[CandidateResult]) -> Table:
+    """Return the errors of candidates by score, to compare with `doorstate.doorways.candidate_errors`."""
+    found = pd.DataFrame(hits, columns=CandidateResult._fields)
+    tenth = np.floor(found["score"] * 10).clip(upper=9).astype(int)
+    lines = found.drop(columns="score").groupby(tenth).quantile(ONE_SIGMA)
+    lines.insert(0, "candidates", found.groupby(tenth).size())
+    lines.insert(0, "score", [f"{low / 10:.1f} to {(low + 1) / 10:.1f}" for low in lines.index])
+    return Table.from_frame(
+        "Errors of candidates by score",
+        lines,
+        [
+            label_column("score"),
+            count_column("candidates"),
+            number_column("along_m", "along the wall, m", 3),
+            number_column("across_m", "across, m", 3),
+            number_column("yaw_deg", "yaw, °", 2),
+            number_column("width_m", "width, m", 2),
+        ],
+        note=f"Candidates within {HIT_M} m and {HIT_DEG:g}° of a door; 68 % of the errors are smaller.",
+    )
+
+
+def _errors(door: TrueDoor, candidate: Doorway) -> CandidateResult:
+    place = np.array([door.x_m, door.y_m, candidate.floor_z_m], np.float32)
+    along_m, across_m, _ = candidate.to_doorway(place).tolist()
+    width_m = abs(candidate.width_m - door.width_m)
+    return CandidateResult(candidate.score, abs(along_m), abs(across_m), gap(door, candidate)[1], width_m)
 
 
 def _door_result(preset: str, sensor: str, door: TrueDoor, candidates: Sequence[Doorway]) -> DoorResult:

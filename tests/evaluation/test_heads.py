@@ -122,7 +122,8 @@ def test_errors_are_those_that_were_put_in(results: Results) -> None:
 def test_standard_errors_are_those_of_validation_doors(results: Results) -> None:
     errors = standard_errors(results, "pointnet2")
     assert errors is not None
-    assert (errors.position_m, errors.yaw_deg) == pytest.approx((0.05, 1))
+    assert (errors.along_m, errors.across_m) == pytest.approx((0.03, 0.04))
+    assert (errors.yaw_deg, errors.width_m) == pytest.approx((1, 0.02))
     assert errors.angle_deg == pytest.approx({"closed": 4, "semi_open": 4, "open": 4})
 
 

@@ -20,7 +20,11 @@ from doorstate.types import STATES, Points
 HEADS = ("door", "angle", "hinge", "frame", "widths")
 CARD = WeightsCard(network="pointnet", num_points=128, input="doorway", scale_m=1.5, heads=HEADS)
 MEASURED = CARD.model_copy(
-    update={"errors": HeadErrors(position_m=0.04, yaw_deg=1.0, angle_deg={"semi_open": 6.0, "open": 5.0})}
+    update={
+        "errors": HeadErrors(
+            along_m=0.04, across_m=0.03, yaw_deg=1.0, width_m=0.1, angle_deg={"semi_open": 6.0, "open": 5.0}
+        )
+    }
 )
 FLOOR_M = -1.0
 

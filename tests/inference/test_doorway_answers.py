@@ -11,9 +11,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from doorstate.doorways.candidate_errors import candidate_errors
 from doorstate.doorways.doorway import Doorway
+from doorstate.inference.door import Door
 from doorstate.inference.doorway_answers import Answer, DecidedDoors, decide_doors
-from doorstate.inference.pose_errors import FINDER_ERRORS, FINDER_POSITION_M
 from doorstate.types import DoorState
 from tests.inference.scripted_doorways import CARD, FLOOR_M, MEASURED, doorway, outputs
 
@@ -192,7 +193,9 @@ def test_without_heads_for_it_place_and_width_are_the_finders() -> None:
     (door,) = decide_doors([Answer(doorway(3.0, 10.0, 1.1), plain)], CARD).doors
     assert (door.distance_m, door.width_m) == pytest.approx((3.0, 1.1))
     assert (door.opening_angle_deg, door.hinge, door.passable_width_m) == (None, None, None)
-    assert (door.position_error_m, door.yaw_error_deg) == (FINDER_POSITION_M, FINDER_ERRORS.yaw_deg)
+    errors = candidate_errors(door.score or 0.0)
+    assert door.position_error_m == pytest.approx(math.hypot(errors.along_m, errors.across_m))
+    assert door.yaw_error_deg == pytest.approx(errors.yaw_deg)
     assert door.angle_error_deg is None
 
 
@@ -202,17 +205,15 @@ def test_heads_that_an_exported_network_withholds_are_missing() -> None:
     assert (door.state, door.opening_angle_deg) == (DoorState.OPEN, None)
 
 
-def test_errors_are_those_of_the_validation_and_grow_with_corrections() -> None:
-    def door(*answers: Answer) -> tuple[float, float, float]:
-        (found,) = decide_doors(answers, MEASURED).doors
-        assert found.position_error_m is not None
-        assert found.yaw_error_deg is not None
-        assert found.angle_error_deg is not None
-        return found.position_error_m, found.yaw_error_deg, found.angle_error_deg
+def test_a_correction_counts_by_the_errors_of_finder_and_network() -> None:
+    def door(score: float) -> Door:
+        answer = Answer(doorway(3.0, score=score), outputs("semi_open", door_x_m=0.06, opening_width_m=1.0))
+        (found,) = decide_doors([answer], MEASURED).doors
+        return found
 
-    semi_open = outputs("semi_open")
-    assert door(Answer(doorway(), semi_open)) == pytest.approx((0.04, 1.0, 6.0))
-    usual = outputs("semi_open", door_x_m=0.08, door_y_m=-0.05, door_yaw_deg=3.0)
-    assert door(Answer(doorway(), usual)) == pytest.approx((0.04, 1.0, 6.0))
-    large = outputs("semi_open", door_x_m=0.24, door_y_m=-0.15, door_yaw_deg=9.0)
-    assert door(Answer(doorway(), large)) == pytest.approx((0.12, 3.0, 6.0))
+    sure, unsure = door(0.95), door(0.25)
+    assert sure.y_m == pytest.approx(0.06 * 0.011**2 / (0.011**2 + 0.04**2), abs=1e-6)
+    assert unsure.y_m == pytest.approx(0.06 * 0.238**2 / (0.238**2 + 0.04**2), abs=1e-6)
+    assert 0.9 < sure.width_m < 0.92 < 0.98 < unsure.width_m < 1.0
+    assert (sure.position_error_m or 1) < 0.012 < 0.03 < (unsure.position_error_m or 0) < 0.05
+    assert (sure.angle_error_deg, unsure.angle_error_deg) == (6.0, 6.0)

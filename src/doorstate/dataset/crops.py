@@ -17,7 +17,7 @@ from doorstate._models import FrozenModel
 from doorstate.clouds.floor import find_floor_z_m
 from doorstate.clouds.outliers import remove_outliers
 from doorstate.doorways.doorway import Doorway, gap
-from doorstate.doorways.finder import FINDER_ERRORS, find_doorways
+from doorstate.doorways.finder import find_doorways
 from doorstate.simulation.manifest import flatten, unflatten
 from doorstate.simulation.noise.streams import sample_seed, stage_rng
 from doorstate.simulation.row import Row
@@ -28,6 +28,7 @@ Columns = Mapping[str, str]
 ADDED: Final = "added"  # in the column `candidate`: a door that the finder missed
 _FRAME = "frame."
 HIT_M, HIT_DEG = 0.35, 20.0  # a candidate this near a door is one of it
+_ADDED_ERRORS = (0.08, 0.05, 3.0)  # of added doors: metres along and across the wall, degrees
 _MOST_SIGMAS = 2.0
 _VISIBLE_SHARE = 0.005  # of the image: leaf, frame or opening of a door that can be seen
 _POSE = ("x_m", "y_m", "yaw_deg", "width_m", "floor_z_m")
@@ -102,13 +103,13 @@ def doorway_of(line: Columns) -> Doorway:
 
 
 def _missed(row: Row, candidates: Sequence[Doorway]) -> list[tuple[Doorway, TrueDoor]]:
-    """Return the visible doors that no candidate hits, placed with the finder's usual errors."""
+    """Return the visible doors that no candidate hits, placed with errors."""
     least_px = _VISIBLE_SHARE * row.camera.width * row.camera.height
     rng = stage_rng(sample_seed(row.seed, row.sample_id), "missed doorways")
     missed = []
     for door in true_doors(row):
         along_m, across_m, turn_deg = (
-            float(sigma * np.clip(rng.normal(), -_MOST_SIGMAS, _MOST_SIGMAS)) for sigma in FINDER_ERRORS
+            float(sigma * np.clip(rng.normal(), -_MOST_SIGMAS, _MOST_SIGMAS)) for sigma in _ADDED_ERRORS
         )
         if door.visible_px.total < least_px or any(is_hit(door, doorway) for doorway in candidates):
             continue

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,18 +26,6 @@ _UPRIGHT_M = (0.15, 2.2)  # heights above the floor without floor, skirting boar
 _PEAK_M = 0.3  # a column is a peak if none so near scores higher
 _SNAP_M, _MIN_END = 0.2, 0.3  # of an edge from the end that a column proposes, and its least probability
 _SAME_M, _SAME_DEG = 0.3, 20.0  # candidates of two walls that are one doorway
-
-
-class Correction(NamedTuple):
-    """Correction of a candidate in the doorway's frame, or the usual size of its components."""
-
-    along_m: float
-    across_m: float
-    yaw_deg: float
-
-
-FINDER_ERRORS = Correction(0.08, 0.05, 3.0)
-"""Usual standard errors of candidates, which training adds to doors that the finder missed."""
 
 
 class FinderSettings(FrozenModel):

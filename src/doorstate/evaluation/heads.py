@@ -8,13 +8,13 @@ from collections.abc import Iterator
 import numpy as np
 import pandas as pd
 
+from doorstate.doorways.candidate_errors import ONE_SIGMA
 from doorstate.evaluation.manifest import number_values, text_values
 from doorstate.evaluation.results import KEY_COLUMNS, RULE_COLUMNS, Results, predicted_column
 from doorstate.networks.card import HeadErrors
 from doorstate.networks.heads import HEADS, POINT_HEADS, head_metrics
 from doorstate.types import DECISION_THRESHOLD, NO_DOOR, PARTS, STATES
 
-_ONE_SIGMA = 0.683  # share of a normal distribution within one standard deviation
 PART_NAMES = POINT_HEADS[PARTS].classes
 
 
@@ -53,7 +53,7 @@ def standard_errors(results: Results, method: str) -> HeadErrors | None:
     """Return the standard errors of a network's heads: 68 % of the validation doors have smaller ones.
 
     Returns:
-        None without the heads `frame` and `angle`, or without their outputs for validation doors.
+        None without the heads `frame`, `widths` and `angle`, or without their outputs for validation doors.
     """
     own = results.joined
     doors = own[(own["method"] == method) & (own["role"] == "val") & (own["state"] != NO_DOOR)]
@@ -61,15 +61,18 @@ def standard_errors(results: Results, method: str) -> HeadErrors | None:
     def errors(name: str) -> pd.Series[float]:
         return number_values(doors, predicted_column(name)) - number_values(doors, name)
 
-    yaw_deg = (errors("door_yaw_deg") + 180) % 360 - 180
-    position_m = pd.Series(np.hypot(errors("door_x_m"), errors("door_y_m")))
-    angle_deg = errors("opening_angle_deg").abs().groupby(doors["state"]).quantile(_ONE_SIGMA).dropna()
-    if position_m.isna().all() or angle_deg.empty:
+    def standard(values: pd.Series[float], digits: int) -> float:
+        return round(float(values.abs().quantile(ONE_SIGMA)), digits)
+
+    angle_deg = errors("opening_angle_deg").groupby(doors["state"])
+    if any(errors(name).isna().all() for name in ("door_x_m", "opening_width_m", "opening_angle_deg")):
         return None
     return HeadErrors(
-        position_m=round(float(position_m.quantile(_ONE_SIGMA)), 4),
-        yaw_deg=round(float(yaw_deg.abs().quantile(_ONE_SIGMA)), 3),
-        angle_deg={str(state): round(float(angle), 2) for state, angle in angle_deg.items()},
+        along_m=standard(errors("door_x_m"), 4),
+        across_m=standard(errors("door_y_m"), 4),
+        yaw_deg=standard((errors("door_yaw_deg") + 180) % 360 - 180, 3),
+        width_m=standard(errors("opening_width_m"), 4),
+        angle_deg={str(state): standard(values, 2) for state, values in angle_deg if values.notna().any()},
     )
 
 

@@ -14,14 +14,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from doorstate.doorways.candidate_errors import candidate_errors
 from doorstate.doorways.doorway import Doorway
-from doorstate.doorways.finder import FINDER_ERRORS, Correction
 from doorstate.inference.abstention import Abstention
 from doorstate.inference.backends.base import CloudOutputs
 from doorstate.inference.decode import abstention_of, leaf_fields
 from doorstate.inference.door import Door, DoorFrame
-from doorstate.inference.pose_errors import FINDER_POSITION_M, door_errors
-from doorstate.networks.card import WeightsCard
+from doorstate.inference.pose_errors import Corrected, Correction, weigh_correction
+from doorstate.networks.card import HeadErrors, WeightsCard
 from doorstate.types import DECISION_THRESHOLD, DOOR, STATES, DoorState
 
 # Chosen: as wide as the finder's usual errors of two candidates of one door; walls of a recess are farther apart.
@@ -36,6 +36,7 @@ class Answer(NamedTuple):
     doorway: Doorway
     outputs: CloudOutputs  # in the doorway's frame
     is_asked: bool = False  # at the place of a door that is known to be there
+    network_errors: HeadErrors | None = None  # None: not measured
 
     @property
     def door_probability(self) -> float:
@@ -49,23 +50,25 @@ class Answer(NamedTuple):
         return probability >= DECISION_THRESHOLD, probability * self.doorway.score, probability
 
     @property
-    def correction(self) -> Correction:
-        """Correction of place and direction in the doorway's frame; zero without the head for it."""
-        names = ("door_x_m", "door_y_m", "door_yaw_deg")
-        return Correction(*(self.outputs.heads.get(name, 0.0) for name in names))
+    def corrected(self) -> Corrected:
+        """Correction of the candidate as it counts, with the errors that are left; none without heads for it."""
+        heads, width_m = self.outputs.heads, self.outputs.heads.get("opening_width_m", 0.0)
+        wider_m = width_m - self.doorway.width_m if width_m >= _MIN_WIDTH_M else 0.0
+        along_m, across_m, yaw_deg = (heads.get(name, 0.0) for name in ("door_x_m", "door_y_m", "door_yaw_deg"))
+        network = self.network_errors if "door_x_m" in heads else None
+        return weigh_correction(Correction(along_m, across_m, yaw_deg, wider_m), self.doorway.score, network)
 
     @property
     def frame(self) -> DoorFrame:
         """Corrected pose in the level sensor frame."""
-        along_m, across_m, yaw_deg = self.correction
+        along_m, across_m, yaw_deg, _ = self.corrected.correction
         x_m, y_m, _ = self.doorway.to_sensor(np.array([along_m, across_m, 0.0], np.float32)).tolist()
         return DoorFrame(x_m, y_m, _turned(self.doorway.yaw_deg + yaw_deg))
 
     @property
     def width_m(self) -> float:
-        """Width of the opening, by the network where it gives one that a door can have."""
-        width_m = self.outputs.heads.get("opening_width_m", 0.0)
-        return width_m if width_m >= _MIN_WIDTH_M else self.doorway.width_m
+        """Corrected width of the opening."""
+        return self.doorway.width_m + self.corrected.correction.width_m
 
     @property
     def leaf(self) -> dict[str, Any]:
@@ -95,7 +98,7 @@ def decide_doors(answers: Sequence[Answer], card: WeightsCard) -> DecidedDoors:
     """
     if DOOR not in card.heads:
         answers = sorted(answers, key=lambda answer: (not answer.is_asked, -answer.doorway.score))[:1]
-    groups = _group(answers)
+    groups = _group([answer._replace(network_errors=card.errors) for answer in answers])
     known = next((group for group in groups if any(answer.is_asked for answer in group)), None)
     decided = [(_decide(group, card, group is known), group is known) for group in groups]
     return DecidedDoors(
@@ -111,6 +114,7 @@ def _is_no_door(door: Door) -> bool:
 
 def refused_candidate(doorway: Doorway, abstention: Abstention) -> Door:
     """Return a candidate that no network was asked about."""
+    errors = candidate_errors(doorway.score)
     return Door(
         doorway.x_m,
         doorway.y_m,
@@ -118,8 +122,8 @@ def refused_candidate(doorway: Doorway, abstention: Abstention) -> Door:
         doorway.width_m,
         None,
         abstention,
-        position_error_m=FINDER_POSITION_M,
-        yaw_error_deg=FINDER_ERRORS.yaw_deg,
+        position_error_m=math.hypot(errors.along_m, errors.across_m),
+        yaw_error_deg=errors.yaw_deg,
         floor_z_m=doorway.floor_z_m,
         score=doorway.score,
     )
@@ -155,7 +159,7 @@ def _decide(group: Sequence[Answer], card: WeightsCard, door_known: bool) -> Doo
     """Return the door of overlapping candidates, with a state or the reason why there is none."""
     answer = group[0]
     x_m, y_m, yaw_deg = answer.frame
-    outputs = answer.outputs
+    outputs, errors = answer.outputs, answer.corrected.errors
     abstention = abstention_of(outputs, card.abstain_below, door_known=door_known)
     state = DoorState.from_index(int(outputs.probabilities.argmax()))
     door = Door(
@@ -167,7 +171,9 @@ def _decide(group: Sequence[Answer], card: WeightsCard, door_known: bool) -> Doo
         raw_probabilities=dict(zip(STATES, outputs.probabilities.tolist(), strict=True)),
         door_probability=outputs.heads.get("p_door"),
         **answer.leaf,
-        **door_errors(card, answer.correction, state)._asdict(),
+        angle_error_deg=None if card.errors is None else card.errors.angle_deg.get(state),
+        position_error_m=math.hypot(errors.along_m, errors.across_m),
+        yaw_error_deg=errors.yaw_deg,
         floor_z_m=answer.doorway.floor_z_m,
         score=answer.doorway.score,
     )

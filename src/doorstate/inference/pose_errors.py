@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Standard errors of a door's place, direction and opening angle.
+"""Pose of a door from a candidate and a network's correction of it, each weighted by its error.
 
-A network learns from crops with the finder's errors and corrects them; what is left is measured on validation doors
-(`WeightsCard.errors`). A correction larger than the finder's usual error makes the errors larger in proportion.
+The finder places a door that it is sure of within 1 cm, and others within 20 cm; a network is off by a few centimetres
+whatever the score. So the correction counts by the variances of both. Errors of the network are measured on validation
+doors (`WeightsCard.errors`); without them its correction counts in full.
 """
 
 from __future__ import annotations
@@ -10,33 +11,48 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from doorstate.doorways.finder import FINDER_ERRORS, Correction
-from doorstate.networks.card import WeightsCard
-from doorstate.types import DoorState
-
-FINDER_POSITION_M = math.hypot(FINDER_ERRORS.along_m, FINDER_ERRORS.across_m)
+from doorstate.doorways.candidate_errors import PoseErrors, candidate_errors
+from doorstate.networks.card import HeadErrors
 
 
-class DoorErrors(NamedTuple):
-    """Standard errors of a door; None for the angle where they are not known."""
+class Correction(NamedTuple):
+    """Correction of a candidate, in the doorway's frame."""
 
-    position_error_m: float
-    yaw_error_deg: float
-    angle_error_deg: float | None
+    along_m: float
+    across_m: float
+    yaw_deg: float
+    width_m: float
 
 
-def door_errors(card: WeightsCard, correction: Correction, state: DoorState) -> DoorErrors:
-    """Return the standard errors of a door.
+class Corrected(NamedTuple):
+    """Correction of a candidate as it counts, and the standard errors of the corrected doorway."""
+
+    correction: Correction
+    errors: PoseErrors
+
+
+NO_CORRECTION = Correction(0.0, 0.0, 0.0, 0.0)
+
+
+def weigh_correction(correction: Correction, score: float, network: HeadErrors | None) -> Corrected:
+    """Return the correction that combines a candidate and a network, and the errors that are left.
+
+    A correction that is larger than the errors of both explain makes the errors larger in proportion.
 
     Args:
-        card: card of the weights; without measured errors, those of the finder hold for place and direction.
-        correction: correction of the candidate.
-        state: state of the door, on which the error of the angle depends.
+        correction: correction by the network.
+        score: score of the candidate.
+        network: errors of the network; None: not measured.
     """
-    measured = card.errors
-    position_m = FINDER_POSITION_M if measured is None else measured.position_m
-    yaw_deg = FINDER_ERRORS.yaw_deg if measured is None else measured.yaw_deg
-    angle_deg = None if measured is None else measured.angle_deg.get(state)
-    ratios = [value / usual for value, usual in zip(correction, FINDER_ERRORS, strict=True)]
+    candidate = candidate_errors(score)
+    if network is None:
+        return Corrected(correction, candidate)
+    own = PoseErrors(network.along_m, network.across_m, network.yaw_deg, network.width_m)
+    spreads = [math.hypot(*pair) for pair in zip(candidate, own, strict=True)]
+    weights = [(error / spread) ** 2 for error, spread in zip(candidate, spreads, strict=True)]
+    ratios = [value / spread for value, spread in zip(correction, spreads, strict=True)]
     growth = max(1.0, math.sqrt(sum(ratio**2 for ratio in ratios) / len(ratios)))
-    return DoorErrors(growth * position_m, growth * yaw_deg, angle_deg)
+    return Corrected(
+        Correction(*(weight * value for weight, value in zip(weights, correction, strict=True))),
+        PoseErrors(*(growth * math.sqrt(weight) * error for weight, error in zip(weights, own, strict=True))),
+    )

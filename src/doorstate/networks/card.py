@@ -24,8 +24,10 @@ _DIGEST = re.compile("sha256:[0-9a-f]{64}")
 class HeadErrors(FrozenModel):
     """Standard errors of the heads on validation doors: 68 % of the errors are smaller."""
 
-    position_m: float = Field(gt=0)  # of the opening's middle
+    along_m: float = Field(gt=0)  # of the opening's middle, along the wall
+    across_m: float = Field(gt=0)
     yaw_deg: float = Field(gt=0)
+    width_m: float = Field(gt=0)  # of the opening
     angle_deg: dict[str, float] = Field(default_factory=dict)  # by state
 
 
