@@ -54,7 +54,9 @@ class Answer(NamedTuple):
         """Correction of the candidate as it counts, with the errors that are left; none without heads for it."""
         heads, width_m = self.outputs.heads, self.outputs.heads.get("opening_width_m", 0.0)
         wider_m = width_m - self.doorway.width_m if width_m >= _MIN_WIDTH_M else 0.0
-        along_m, across_m, yaw_deg = (heads.get(name, 0.0) for name in ("door_x_m", "door_y_m", "door_yaw_deg"))
+        along_m, across_m, yaw_deg = (
+            heads.get(name, 0.0) for name in ("door_x_m", "door_y_m", "door_yaw_deg")
+        )
         network = self.network_errors if "door_x_m" in heads else None
         return weigh_correction(Correction(along_m, across_m, yaw_deg, wider_m), self.doorway.score, network)
 
