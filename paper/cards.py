@@ -9,12 +9,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from doorstate._documents import read_json
 from doorstate.clouds.augmentation import Augmentation
+from doorstate.dataset.crops import FINDER_SCORE
 from doorstate.evaluation.heads import head_errors, head_rows, score_four_labels
 from doorstate.evaluation.method_scores import MACRO, score_states
 from doorstate.evaluation.results import Results
 from doorstate.networks.card import HeadErrors, WeightsCard
+from doorstate.networks.door_calibration import DoorCalibration
 from doorstate.training.run_folder import RunFolder
 from doorstate.types import STATES
 
@@ -32,6 +36,7 @@ class Evidence:
         calibration_error: expected calibration error after scaling.
         comparisons: published results to show on the card.
         errors: standard errors of the heads; None where they were not measured.
+        door_calibration: probability of a door by network and finder; None for whole clouds.
         named: share of tested doors that are given a state, and share of these that is correct; None without threshold.
     """
 
@@ -41,6 +46,7 @@ class Evidence:
     calibration_error: float
     comparisons: tuple[Results, ...]
     errors: HeadErrors | None = None
+    door_calibration: DoorCalibration | None = None
     named: tuple[float, float] | None = None
 
 
@@ -99,7 +105,7 @@ def model_card(path: Path, card: WeightsCard, parameters: int, training: Trainin
             "evidence": evidence,
             "states": STATES,
             "scores": [_scores(results, card.network) for results in evidence.comparisons],
-            "heads": _heads(evidence.comparisons[0], card.network) if card.heads else None,
+            "heads": _heads(evidence.comparisons[0], card) if card.heads else None,
         },
     )
 
@@ -115,8 +121,13 @@ def _scores(results: Results, network: str) -> dict[str, Any]:
     }
 
 
-def _heads(results: Results, network: str) -> dict[str, float]:
-    rows = head_rows(results, network)
+def _heads(results: Results, card: WeightsCard) -> dict[str, float]:
+    rows = head_rows(results, card.network)
     four = score_four_labels(results)
-    no_door = four.loc[four["method"] == network, "no_door"].iloc[0]
-    return {"no_door": float(no_door), **({} if rows is None else head_errors(rows))}
+    no_door = four.loc[four["method"] == card.network, "no_door"].iloc[0]
+    heads = {"no_door": float(no_door), **({} if rows is None else head_errors(rows))}
+    if card.door_calibration is not None and rows is not None:
+        p_door, score = (rows[name].to_numpy(dtype=np.float64) for name in ("p_door", FINDER_SCORE))
+        together = rows.assign(p_door=card.door_calibration.probabilities(p_door, score))
+        heads["door_auroc_with_finder"] = head_errors(together)["door_auroc"]
+    return heads

@@ -10,11 +10,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.special import expit, logit
 
 from doorstate.doorways.candidate_errors import candidate_errors
 from doorstate.doorways.doorway import Doorway
 from doorstate.inference.door import Door
 from doorstate.inference.doorway_answers import Answer, DecidedDoors, decide_doors
+from doorstate.networks.door_calibration import DoorCalibration
 from doorstate.types import DoorState
 from tests.inference.scripted_doorways import CARD, FLOOR_M, MEASURED, doorway, outputs
 
@@ -217,3 +219,21 @@ def test_a_correction_counts_by_the_errors_of_finder_and_network() -> None:
     assert 0.9 < sure.width_m < 0.92 < 0.98 < unsure.width_m < 1.0
     assert (sure.position_error_m or 1) < 0.012 < 0.03 < (unsure.position_error_m or 0) < 0.05
     assert (sure.angle_error_deg, unsure.angle_error_deg) == (6.0, 6.0)
+
+
+def test_the_probability_of_a_door_is_that_of_network_and_finder() -> None:
+    calibration = DoorCalibration(door=0.5, score=1.0, offset=-0.2)
+    card = CARD.model_copy(update={"door_calibration": calibration})
+    sure, unsure = doorway(score=0.9), doorway(bearing_deg=40, score=0.1)
+    result = decide_doors([Answer(place, outputs(p_door=0.9)) for place in (sure, unsure)], card)
+    (door,), (refused,) = result.doors, result.refused
+    assert door.door_probability == pytest.approx(expit(0.5 * logit(0.9) + logit(0.9) - 0.2))
+    assert refused.door_probability == pytest.approx(expit(0.5 * logit(0.9) + logit(0.1) - 0.2))
+    assert refused.abstention is not None
+    assert refused.abstention.code == "no_door"
+
+
+def test_a_known_door_is_one_whatever_the_finder_holds_of_it() -> None:
+    card = CARD.model_copy(update={"door_calibration": DoorCalibration(door=0.5, score=1.0, offset=-5.0)})
+    (door,) = decide_doors([Answer(doorway(), outputs(), is_asked=True)], card).doors
+    assert door.state == DoorState.CLOSED

@@ -7,9 +7,14 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.special import log_softmax, softmax
+from scipy.special import expit, log_softmax, logit, softmax
 
-from doorstate.training.calibration import abstain_threshold, at_temperature, fit_temperature
+from doorstate.training.calibration import (
+    abstain_threshold,
+    at_temperature,
+    fit_door_calibration,
+    fit_temperature,
+)
 
 
 def draw_labels(temperature: float, samples: int = 20_000) -> tuple[np.ndarray, np.ndarray]:
@@ -79,3 +84,20 @@ def test_threshold_keeps_as_many_predictions_as_allowed(
         if more.sum() > kept.sum():
             assert (~correct[more]).sum() > error_share * more.sum()
     assert 0 <= threshold < 1
+
+
+def test_door_calibration_is_the_logistic_regression_of_drawn_doors() -> None:
+    rng = np.random.default_rng(0)
+    p_door, score = rng.uniform(0.02, 0.98, (2, 20_000))
+    true = expit(0.6 * logit(p_door) + 1.2 * logit(score) - 1.0)
+    fitted = fit_door_calibration(p_door, score, rng.random(20_000) < true)
+    assert (fitted.door, fitted.score, fitted.offset) == pytest.approx((0.6, 1.2, -1.0), abs=0.1)
+    np.testing.assert_allclose(fitted.probabilities(p_door, score), true, atol=0.03)
+
+
+def test_door_calibration_of_candidates_that_a_line_separates_is_finite() -> None:
+    p_door = np.array([0.0, 0.1, 0.9, 1.0])
+    fitted = fit_door_calibration(p_door, np.full(4, 0.5), p_door > 0.5)
+    probabilities = fitted.probabilities(p_door, np.full(4, 0.5))
+    assert (np.diff(probabilities) >= 0).all()
+    assert probabilities[1] < 0.1 < 0.9 < probabilities[2]

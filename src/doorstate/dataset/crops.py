@@ -25,6 +25,7 @@ from doorstate.simulation.truth import DOOR_COLUMNS, TrueDoor, main_columns, tru
 from doorstate.types import NO_DOOR, Points
 
 Columns = Mapping[str, str]
+FINDER_SCORE: Final = "finder_score"  # column
 ADDED: Final = "added"  # in the column `candidate`: a door that the finder missed
 _FRAME = "frame."
 HIT_M, HIT_DEG = 0.35, 20.0  # a candidate this near a door is one of it
@@ -99,7 +100,7 @@ def frame_row(line: Columns) -> Row:
 def doorway_of(line: Columns) -> Doorway:
     """Return the doorway at which the crop of a line was taken, in the sensor frame."""
     x_m, y_m, yaw_deg, width_m, floor_z_m = (float(line[f"doorway_{name}"]) for name in _POSE)
-    return Doorway(x_m, y_m, yaw_deg, width_m, floor_z_m, score=float(line["finder_score"]))
+    return Doorway(x_m, y_m, yaw_deg, width_m, floor_z_m, score=float(line[FINDER_SCORE]))
 
 
 def _missed(row: Row, candidates: Sequence[Doorway]) -> list[tuple[Doorway, TrueDoor]]:
@@ -153,7 +154,7 @@ def _door_columns(door: TrueDoor | None, doorway: Doorway) -> dict[str, object]:
 
 def _candidate_columns(frame_id: str, doorway: Doorway, candidate: str) -> dict[str, str]:
     pose = {f"doorway_{name}": _text(getattr(doorway, name)) for name in _POSE}
-    return {"frame_id": frame_id, "candidate": candidate, **pose, "finder_score": _text(doorway.score)}
+    return {"frame_id": frame_id, "candidate": candidate, **pose, FINDER_SCORE: _text(doorway.score)}
 
 
 def _text(value: object) -> str:

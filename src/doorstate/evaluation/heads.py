@@ -8,11 +8,14 @@ from collections.abc import Iterator
 import numpy as np
 import pandas as pd
 
+from doorstate.dataset.crops import FINDER_SCORE
 from doorstate.doorways.candidate_errors import ONE_SIGMA
 from doorstate.evaluation.manifest import number_values, text_values
 from doorstate.evaluation.results import KEY_COLUMNS, RULE_COLUMNS, Results, predicted_column
 from doorstate.networks.card import HeadErrors
+from doorstate.networks.door_calibration import DoorCalibration
 from doorstate.networks.heads import HEADS, POINT_HEADS, head_metrics
+from doorstate.training.calibration import fit_door_calibration
 from doorstate.types import DECISION_THRESHOLD, NO_DOOR, PARTS, STATES
 
 PART_NAMES = POINT_HEADS[PARTS].classes
@@ -83,6 +86,19 @@ def score_heads(results: Results) -> pd.DataFrame:
         for method, outputs in _with_heads(results)
     ]
     return pd.DataFrame(rows)
+
+
+def door_calibration(results: Results, method: str) -> DoorCalibration | None:
+    """Return the probability of a door by network and finder, fitted on validation crops of candidates.
+
+    Returns:
+        None for whole clouds, and without the head `door`.
+    """
+    own = results.joined[(results.joined["method"] == method) & (results.joined["role"] == "val")]
+    outputs = [np.asarray(number_values(own, name), np.float64) for name in ("p_door", FINDER_SCORE)]
+    if np.isnan(outputs).any():
+        return None
+    return fit_door_calibration(outputs[0], outputs[1], (own["state"] != NO_DOOR).to_numpy())
 
 
 def score_presence(results: Results) -> pd.DataFrame:

@@ -50,7 +50,11 @@ def decode(
 
 
 def abstention_of(
-    outputs: CloudOutputs, abstain_below: float, *, door_known: bool = False
+    outputs: CloudOutputs,
+    abstain_below: float,
+    *,
+    door_known: bool = False,
+    min_door_probability: float = DECISION_THRESHOLD,
 ) -> Abstention | None:
     """Return the reason why the outputs of a network give no state; None where they give one.
 
@@ -58,11 +62,12 @@ def abstention_of(
         outputs: outputs of the network.
         abstain_below: least probability of a state.
         door_known: a door is known to be there, so that its probability is not asked.
+        min_door_probability: least probability of a door.
     """
     if not outputs.are_valid():
         return Abstention("invalid_outputs")
     p_door = outputs.heads.get("p_door")
-    if p_door is not None and p_door < DECISION_THRESHOLD and not door_known:
+    if p_door is not None and p_door < min_door_probability and not door_known:
         return Abstention("no_door", {"probability": p_door})
     likeliest = int(outputs.probabilities.argmax())
     probability = float(outputs.probabilities[likeliest])

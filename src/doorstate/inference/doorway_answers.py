@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Doors from the outputs of a network for the crops of one cloud: placed, one for each place, and decided.
 
-The network corrects place, direction and width of each candidate in the doorway's frame. Candidates whose corrected
-openings overlap on nearly the same wall are one door: the one that finder and network together hold likeliest. They
-are rival proposals, half a metre apart as a rule, so that a mean of them would be beside the door.
+A door's probability is that of network and finder together, where the weights are calibrated for it. The network
+corrects place, direction and width of each candidate in the doorway's frame. Candidates whose corrected openings
+overlap on nearly the same wall are one door: the one that finder and network together hold likeliest. They are rival
+proposals, half a metre apart as a rule, so that a mean of them would be beside the door.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ class Answer(NamedTuple):
 
     @property
     def rank(self) -> tuple[bool, float, float]:
-        """Order among candidates, the likeliest last: what the network calls a door, then by finder and network."""
+        """Order among candidates, the likeliest last: those that are rather a door, then by finder and network."""
         probability = self.door_probability
         return probability >= DECISION_THRESHOLD, probability * self.doorway.score, probability
 
@@ -100,7 +101,7 @@ def decide_doors(answers: Sequence[Answer], card: WeightsCard) -> DecidedDoors:
     """
     if DOOR not in card.heads:
         answers = sorted(answers, key=lambda answer: (not answer.is_asked, -answer.doorway.score))[:1]
-    groups = _group([answer._replace(network_errors=card.errors) for answer in answers])
+    groups = _group([_calibrate(answer, card) for answer in answers])
     known = next((group for group in groups if any(answer.is_asked for answer in group)), None)
     decided = [(_decide(group, card, group is known), group is known) for group in groups]
     return DecidedDoors(
@@ -108,6 +109,15 @@ def decide_doors(answers: Sequence[Answer], card: WeightsCard) -> DecidedDoors:
         tuple(door for door, _ in decided if _is_no_door(door)),
         next((door for door, is_known in decided if is_known), None),
     )
+
+
+def _calibrate(answer: Answer, card: WeightsCard) -> Answer:
+    """Return an answer with the errors of the network, and with the probability of a door by network and finder."""
+    heads, calibration = answer.outputs.heads, card.door_calibration
+    if calibration is not None and "p_door" in heads:
+        pair = (np.array([heads["p_door"]]), np.array([answer.doorway.score]))
+        heads = {**heads, "p_door": float(calibration.probabilities(*pair)[0])}
+    return answer._replace(outputs=answer.outputs._replace(heads=heads), network_errors=card.errors)
 
 
 def _is_no_door(door: Door) -> bool:
@@ -162,7 +172,8 @@ def _decide(group: Sequence[Answer], card: WeightsCard, door_known: bool) -> Doo
     answer = group[0]
     x_m, y_m, yaw_deg = answer.frame
     outputs, errors = answer.outputs, answer.corrected.errors
-    abstention = abstention_of(outputs, card.abstain_below, door_known=door_known)
+    least = DECISION_THRESHOLD if card.door_calibration is None else card.door_calibration.min_probability
+    abstention = abstention_of(outputs, card.abstain_below, door_known=door_known, min_door_probability=least)
     state = DoorState.from_index(int(outputs.probabilities.argmax()))
     door = Door(
         x_m,

@@ -14,6 +14,7 @@ from doorstate._models import FrozenModel, Name
 from doorstate.clouds.normalization import NORMALIZATIONS, SCALE_M, Input, Normalization
 from doorstate.clouds.preparation import MAX_NUM_POINTS, CloudSpec
 from doorstate.errors import WeightsError, first_validation_error
+from doorstate.networks.door_calibration import DoorCalibration
 from doorstate.types import STATES
 
 CARD_KEY = "doorstate"  # of the card, in the metadata of weights files and exported networks
@@ -49,6 +50,8 @@ class WeightsCard(FrozenModel):
     temperature: float = Field(default=1.0, ge=1e-3, le=1e3)
     abstain_below: float = Field(default=0.0, ge=0, lt=1)  # abstain if no state is more probable
     errors: HeadErrors | None = None  # on validation doors; None: not measured
+    # Of crops, with the finder's score; None: the head `door` counts as it is.
+    door_calibration: DoorCalibration | None = None
     trained_on: str = ""
     doorstate_version: str = __version__
 

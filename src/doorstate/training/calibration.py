@@ -1,16 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Temperature scaling (Guo et al. 2017), and the probability below which a network abstains."""
+"""Calibration: temperature of the states (Guo et al. 2017), least probability of an answer, probability of a door."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
+from scipy.optimize import minimize, minimize_scalar
+from scipy.special import expit
+
+from doorstate.networks.door_calibration import DoorCalibration, door_features
 
 Probabilities = NDArray[np.float64]
 
 _LOG_BOUNDS = (-3.0, 3.0)
 _SMALLEST = 1e-30
+_RIDGE = 1e-5
 
 
 def fit_temperature(probabilities: Probabilities, labels: NDArray[np.int64]) -> float:
@@ -63,3 +67,28 @@ def abstain_threshold(probabilities: Probabilities, labels: NDArray[np.int64], e
     if len(allowed) == 0:
         return float(np.nextafter(confidence.max(initial=0.0), 1))
     return 0.0 if allowed[-1] == len(confidence) - 1 else float(confidence[order][allowed[-1]])
+
+
+def fit_door_calibration(
+    p_door: NDArray[np.float64], score: NDArray[np.float64], is_door: NDArray[np.bool_]
+) -> DoorCalibration:
+    """Return the logistic regression with the least cross entropy on held-out candidates.
+
+    A weak ridge keeps it finite where a line separates doors from the rest.
+
+    Args:
+        p_door: (M,) probabilities of the head `door`.
+        score: (M,) scores of the finder.
+        is_door: (M,) True for doors.
+    """
+    inputs = door_features(p_door, score)
+    signs = np.where(is_door, 1.0, -1.0)
+
+    def loss(weights: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+        margins = signs * (inputs @ weights)
+        cross_entropy = np.logaddexp(0, -margins).mean()
+        gradient = -(inputs * (signs * expit(-margins))[:, None]).mean(axis=0)
+        return float(cross_entropy + _RIDGE * weights @ weights), gradient + 2 * _RIDGE * weights
+
+    door, finder, offset = minimize(loss, np.array([1.0, 1.0, 0.0]), jac=True).x
+    return DoorCalibration(door=round(door, 4), score=round(finder, 4), offset=round(offset, 4))
