@@ -48,7 +48,8 @@ class Answers:
     """Predictor in a process of its own."""
 
     def __init__(self, form: Form, network: str) -> None:
-        self._predictor, self._cloud = NetworkPredictor(_backend(form, network)), raw_cloud()
+        backend = _backend(form, network)
+        self._predictor, self._cloud = NetworkPredictor.for_card(backend.card)(backend), raw_cloud()
         self._predictor.warm_up()
         self.milliseconds()
 

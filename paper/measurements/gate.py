@@ -87,7 +87,7 @@ FAULTS: dict[str, Fault] = {
 def measure_gate(network: str, count: int, progress: Progress) -> list[GateResult]:
     """Return the predictions of packaged weights for simulated doors with every fault."""
     gated = NetworkPredictor.from_weights(network)
-    ungated = NetworkPredictor(gated.backend, gate=None)
+    ungated = type(gated)(gated.backend, gate=None)
     results = []
     for number, (row, frame) in enumerate(reference_frames(count, progress)):
         for fault_name, fault in FAULTS.items():

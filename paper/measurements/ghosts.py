@@ -63,7 +63,7 @@ def measure_ghosts(
     removing = all_methods(network)
     first = removing[network]
     assert isinstance(first, NetworkPredictor)
-    keeping = NetworkPredictor(first.backend, remove_outliers=False)
+    keeping = type(first)(first.backend, remove_outliers=False)
     for door in doors:
         row, frame = _frame_of(door)
         is_closed = row.state == "closed"

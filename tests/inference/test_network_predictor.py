@@ -12,12 +12,13 @@ import numpy as np
 import pytest
 import torch
 
-from doorstate.clouds.normalization import normalize
+from doorstate.clouds.normalization import Input, normalize
 from doorstate.clouds.preparation import CloudSpec, prepare_cloud
 from doorstate.dataset.store import PreparedDataset
-from doorstate.errors import CloudContentError
+from doorstate.errors import CloudContentError, ConfigError
 from doorstate.inference.backends import Outputs
 from doorstate.inference.backends.torch_backend import TorchBackend
+from doorstate.inference.doorway_predictor import DoorwayPredictor
 from doorstate.inference.network_predictor import NetworkPredictor
 from doorstate.inference.rule_predictor import RulePredictor
 from doorstate.networks import create_network
@@ -310,3 +311,12 @@ def test_warming_up_gives_an_exported_network_all_its_points() -> None:
     card = WeightsCard(network="pointnet", num_points=1024)
     NetworkPredictor(FixedSize(create_network("pointnet"), card)).warm_up()
     assert FixedSize.counts == [1024]
+
+
+@pytest.mark.parametrize(("kind", "input_"), [(NetworkPredictor, "doorway"), (DoorwayPredictor, "whole")])
+def test_weights_for_clouds_of_another_kind_are_refused(kind: type[NetworkPredictor], input_: Input) -> None:
+    card = WeightsCard(network="pointnet", num_points=128, input=input_)
+    backend = TorchBackend(create_network("pointnet"), card)
+    with pytest.raises(ConfigError, match=input_):
+        kind(backend)
+    assert NetworkPredictor.for_card(card)(backend).input == input_

@@ -57,6 +57,8 @@ class DoorwayPredictor(NetworkPredictor):
     Predictions have `doors` and `refused`, in the level sensor frame.
     """
 
+    input = "doorway"
+
     @property
     def crop_spec(self) -> CropSpec:
         """Crops that the network takes."""

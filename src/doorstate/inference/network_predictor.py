@@ -6,10 +6,11 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from doorstate.clouds.normalization import Input
 from doorstate.clouds.outliers import CleanCloud
 from doorstate.clouds.preparation import MIN_POINTS, CloudSpec, PreparedCloud, prepare_cloud
 from doorstate.clouds.shape import check_single_cloud
@@ -41,8 +42,12 @@ class NetworkPredictor(Predictor):
         clock: seconds, for `milliseconds` and time budgets.
 
     Raises:
-        ConfigError: fewer than 128 points, or another number than the backend takes.
+        ConfigError: fewer than 128 points, another number than the backend takes, or weights for clouds of another kind
+            (`for_card` returns the class that takes them).
     """
+
+    input: ClassVar[Input] = "whole"
+    """Clouds that the network takes."""
 
     def __init__(
         self,
@@ -60,6 +65,8 @@ class NetworkPredictor(Predictor):
         self.gate = gate
         self.removes_outliers = self.card.remove_outliers if remove_outliers is None else remove_outliers
         self.clock = clock
+        if self.card.input != self.input:
+            raise ConfigError(f"these weights take {self.card.input} clouds, not {self.input} ones")
         if self.num_points < MIN_POINTS:
             raise ConfigError(
                 f"{num_points} points are too few for a network", expected=f"{MIN_POINTS} or more"
@@ -106,7 +113,7 @@ class NetworkPredictor(Predictor):
             raise ConfigError(f"a call needs a thread, not {threads}", field="threads", expected="1 or more")
         loaded = load_backend(name_or_path, threads, backend)
 
-        predictor = cls._for_input(loaded.card)
+        predictor = cls.for_card(loaded.card)
 
         def with_points(count: int | None) -> NetworkPredictor:
             return predictor(loaded, count, thin=thin, gate=gate, clock=clock)
@@ -118,9 +125,9 @@ class NetworkPredictor(Predictor):
         return largest_within_budget(with_points, loaded.card.num_points, budget_ms)
 
     @classmethod
-    def _for_input(cls, card: WeightsCard) -> type[NetworkPredictor]:
+    def for_card(cls, card: WeightsCard) -> type[NetworkPredictor]:
         """Return the class for the clouds that weights take."""
-        if card.input == "whole":
+        if card.input == cls.input:
             return cls
         # The subclass imports this module.
         from doorstate.inference.doorway_predictor import DoorwayPredictor
