@@ -54,6 +54,18 @@ SIMULATED = {
     "doorways-no-door-d435": "--preset no-door --scenes 450 --seed 68 --sensor d435",
     "doorways-no-door-kinect": "--preset no-door --scenes 300 --seed 69 --sensor kinect",
     "doorways-no-door-clean": "--preset no-door --scenes 150 --seed 70",
+    # As many again, most of them with doors.
+    "more-doorways-varied-xtion": "--preset varied --scenes 1000 --seed 81 --sensor xtion",
+    "more-doorways-varied-d435": "--preset varied --scenes 500 --seed 82 --sensor d435",
+    "more-doorways-varied-kinect": "--preset varied --scenes 250 --seed 83 --sensor kinect",
+    "more-doorways-cluttered-xtion": "--preset cluttered --scenes 400 --seed 84 --sensor xtion",
+    "more-doorways-cluttered-d435": "--preset cluttered --scenes 300 --seed 85 --sensor d435",
+    "more-doorways-cluttered-kinect": "--preset cluttered --scenes 250 --seed 86 --sensor kinect",
+    "more-doorways-corridor-xtion": "--preset corridor --scenes 300 --seed 91 --sensor xtion",
+    "more-doorways-corridor-d435": "--preset corridor --scenes 200 --seed 92 --sensor d435",
+    "more-doorways-two-doors-xtion": "--preset two-doors --scenes 300 --seed 93 --sensor xtion",
+    "more-doorways-two-doors-d435": "--preset two-doors --scenes 200 --seed 94 --sensor d435",
+    "more-doorways-no-door-xtion": "--preset no-door --scenes 300 --seed 87 --sensor xtion",
     # Test sets: the same doors for every sensor.
     **{
         f"test-{name}": f"--preset varied --scenes 100 --seed 21 --sensor {sensor}"
@@ -80,10 +92,12 @@ _MIXED = (
     "no-door-clean",
 )
 _DOORWAYS = tuple(name for name in SIMULATED if name.startswith("doorways-"))
+_MORE_DOORWAYS = tuple(name for name in SIMULATED if name.startswith("more-doorways-"))
 JOINED = {
     "mixture": _MIXED,
     "more-mixture": tuple(f"more-{part}" for part in _MIXED),
     "doorways-train": _DOORWAYS,
+    "more-doorways": _MORE_DOORWAYS,
 }
 # The D435 reaches 10 m, all others 5 m or less. Doors are within 3.5 m; without a limit, farthest-point sampling would
 # spend most points on the next room behind an open door. Clouds are thinned as a predictor thins them.
@@ -122,7 +136,7 @@ def dataset_commands(prepared: Path) -> Iterator[Command]:
 
 def _preparation(name: str) -> str:
     """Return the options of the prepared clouds of a simulation."""
-    if name in _DOORWAYS:
+    if name in (*_DOORWAYS, *_MORE_DOORWAYS):
         return "--input doorway --add-missed"
     if name.endswith("-doorways"):  # one answer a frame
         return "--input doorway --crops best"
