@@ -6,7 +6,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
-from scipy.special import expit, logit
 
 from doorstate._models import FrozenModel
 from doorstate.types import DECISION_THRESHOLD
@@ -31,10 +30,11 @@ class DoorCalibration(FrozenModel):
 
     def probabilities(self, p_door: Values, score: Values) -> Values:
         """Return the probabilities of doors, (M,), from those of the network and the scores of the candidates."""
-        return np.asarray(expit(door_features(p_door, score) @ (self.door, self.score, self.offset)))
+        logits = door_features(p_door, score) @ (self.door, self.score, self.offset)
+        return np.asarray(1 / (1 + np.exp(-logits)))
 
 
 def door_features(p_door: Values, score: Values) -> Values:
     """Return the inputs of the regression for M candidates, (M, 3): two logits and 1."""
-    door, finder = (logit(np.clip(values, _LEAST, 1 - _LEAST)) for values in (p_door, score))
-    return np.stack([door, finder, np.ones_like(door)], axis=1)
+    door, finder = (np.clip(values, _LEAST, 1 - _LEAST) for values in (p_door, score))
+    return np.stack([np.log(door / (1 - door)), np.log(finder / (1 - finder)), np.ones_like(door)], axis=1)
