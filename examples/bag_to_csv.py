@@ -32,7 +32,7 @@ def main(recording: Path, table: Path) -> None:
             if isinstance(cloud, DoorstateError):  # a damaged message
                 print(f"{stamp_s:.3f}: {cloud}", file=sys.stderr)
                 continue
-            prediction = predictor(cloud)
+            prediction = predictor(cloud, is_level=True)  # without it, the tilt is told from the cloud
             if prediction.state not in (None, previous):
                 previous = prediction.state
                 rows.writerow([f"{stamp_s:.3f}", previous, f"{prediction.probability:.3f}"])

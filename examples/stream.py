@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 from doorstate import Predictor, StateFilter, wait_for
@@ -29,19 +30,20 @@ def stamped_clouds(recording: Path) -> Iterator[tuple[float, Points]]:
 
 def main(recording: Path) -> int:
     """Print every change, then wait; return the exit code."""
-    predictor = Predictor.load()  # or Predictor.load(budget_ms=33)
+    # Or Predictor.load(budget_ms=33). A camera that is not level: without is_level, the tilt is told from each cloud.
+    predict = partial(Predictor.load(), is_level=True)
     state_filter = StateFilter()
     start_s = previous = None
     for stamp_s, cloud in stamped_clouds(recording):
         start_s = stamp_s if start_s is None else start_s
-        prediction = predictor(cloud)
+        prediction = predict(cloud)
         door = state_filter.update(prediction, stamp_s)
         states = (prediction.state, door.state)
         if states != previous:
             single, filtered = (state or "unknown" for state in states)
             print(f"{stamp_s - start_s:4.1f} s  this frame: {single:9}  filtered: {filtered}")
             previous = states
-    if wait_for("open", stamped_clouds(recording), timeout_s=30, hold_s=1.0, predictor=predictor):
+    if wait_for("open", stamped_clouds(recording), timeout_s=30, hold_s=1.0, predictor=predict):
         print("the way is free")
         return 0
     print("still not open: ask for help")

@@ -34,6 +34,7 @@ from doorstate.inference.tilt import Tilt
 from doorstate.types import Points
 
 MAX_DOORS = 8  # of a cloud
+_GIVE_TILT = {"pitch_deg": None, "roll_deg": None}  # parameters that tell what the cloud does not
 _SAMPLE_POINTS = 16_384  # of a cloud, to check its units
 
 
@@ -110,7 +111,7 @@ class DoorwayPredictor(NetworkPredictor):
             camera_height_m=known.camera_height_m,
         )
         if level.refusal is not None:
-            abstention = Abstention(level.refusal.code, level.refusal.values)
+            abstention = Abstention(level.refusal.code, level.refusal.values, suggestions=_GIVE_TILT)
             return _Scene(level.points, num_points, abstention)
         tilt = None if level.source in (None, "given") else Tilt.of(level)
         scene = _Scene(level.points, num_points, tilt=tilt)
