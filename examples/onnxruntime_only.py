@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Answer for one cloud with NumPy and onnxruntime alone, to be written again in any language.
 
-    doorstate export --network pointnet2 --points 512 --out door.onnx   # once, where doorstate is
+    doorstate export --network ogurob-pointnet2 --points 512 --out door.onnx   # once, where doorstate is
     python examples/onnxruntime_only.py door.onnx cloud.npy
 
 The cloud is (N, 3) or (H, W, 3) metres, x forward, y left, z up, NaN where nothing was measured. The graph refuses what
 it can see: no door, too unsure a state, and points that are not those of a camera before a door. What it cannot see,
-holes and a missing share of the raw cloud, is left to the program (docs/onnx.md). Exit code: 0 a state, 2 none.
+holes and a missing share of the raw cloud, is left to the program (docs/onnx.md). Networks for doorways need the search
+for doorways too, which is more than fits here. Exit code: 0 a state, 2 none.
 """
 
 from __future__ import annotations
@@ -49,6 +50,8 @@ def answer(session: onnxruntime.InferenceSession, cloud: np.ndarray) -> dict[str
     """Return the state with its probability and the heads, or the reason why there is none."""
     metadata = session.get_modelmeta().custom_metadata_map
     card = json.loads(metadata["doorstate"])
+    if card["input"] != "whole":
+        sys.exit("this network takes crops of doorways: doorstate finds them, see docs/onnx.md")
     points = prepare(cloud, card["num_points"], card["max_depth_m"])
     if points is None:
         return {"state": None, "reason": TOO_FEW}
