@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from doorstate.dataset.crops import frame_line
 from doorstate.simulation.frames import depth_sha256, replay
 from doorstate.simulation.generate import simulate_rows
 from doorstate.simulation.manifest import flatten, unflatten
@@ -20,8 +21,9 @@ DEPTH_SHA256 = "ead258849ade8205611056790803cde62c496e5318f147dac1a67e655d30b9de
 
 
 def read(path: Path) -> list[dict[str, str]]:
+    """Return the rows of the frames; of crops, one for each."""
     with gzip.open(path, "rt", encoding="utf-8", newline="") as stream:
-        return list(csv.DictReader(stream))
+        return [dict(frame_line(line)) for line in csv.DictReader(stream)]
 
 
 def spread(rows: list[dict[str, str]], count: int) -> list[dict[str, str]]:
@@ -69,6 +71,7 @@ def test_published_rows_render_to_the_same_bits(path: Path) -> None:
 def test_published_rows_are_drawn_again_by_their_presets(path: Path) -> None:
     rows = read(path)
     measured = {"sensor", "occluded_share", "occluded_bin", "measured_px", "same_image_as", "depth_sha256"}
+    measured |= {"other_doors"}  # with the pixels that see them
     for line in spread(rows, 5):
         drawn = {
             row.sample_id: flatten(row)
