@@ -11,6 +11,7 @@ import pytest
 
 from doorstate.clouds.leveling import Leveling
 from doorstate.doorways.doorway import Doorway
+from doorstate.doorways.upright import Upright
 from doorstate.inference import doorway_predictor
 from doorstate.inference.backends.base import CloudOutputs, Outputs
 from doorstate.inference.doorway_predictor import DoorwayPredictor
@@ -84,12 +85,11 @@ def scripted_predictor(
     leveling: Leveling | None = None,
 ) -> DoorwayPredictor:
     """Return a predictor without a gate, whose finder and network answer by a script."""
-    monkeypatch.setattr(doorway_predictor, "find_doorways", lambda cloud, floor_z_m: list(found))
 
-    def level(cloud: Points, **_: float | None) -> Leveling:
-        return leveling or Leveling(cloud, np.eye(3), "given", floor_z_m=FLOOR_M)
+    def find(cloud: Points, **_: float | None) -> Upright:
+        return Upright(leveling or Leveling(cloud, np.eye(3), "given", floor_z_m=FLOOR_M), list(found))
 
-    monkeypatch.setattr(doorway_predictor, "level_cloud", level)
+    monkeypatch.setattr(doorway_predictor, "find_upright_doorways", find)
     return DoorwayPredictor(ScriptedBackend(script, card), gate=None)
 
 

@@ -21,7 +21,7 @@ from doorstate.clouds.view_planes import find_planes, sample_ahead
 from doorstate.io.rotations import rotate, tilt_matrix
 from doorstate.types import Points
 
-LevelingSource = Literal["given", "floor", "walls"]
+LevelingSource = Literal["given", "floor", "walls", "doorways"]  # the last by `doorways.upright`
 
 
 @dataclass(frozen=True, eq=False)

@@ -139,8 +139,10 @@ def _choose(verticals: Sequence[Vertical], scores: Floats) -> Vertical | Levelin
                 "min_probability": _MIN_PROBABILITY[best.quarter_turns],
                 "pitch_deg": best.pitch_deg,
                 "roll_deg": best.roll_deg,
+                "error_deg": best.error_deg,
                 "other_pitch_deg": other.pitch_deg,
                 "other_roll_deg": other.roll_deg,
+                "other_error_deg": other.error_deg,
             },
         )
     if best.error_deg > _MAX_ERROR_DEG:

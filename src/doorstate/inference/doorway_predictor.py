@@ -12,14 +12,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from doorstate.clouds.leveling import level_cloud
 from doorstate.clouds.measured import is_measured
 from doorstate.clouds.preparation import MIN_POINTS, PreparedCloud, prepare_cloud, too_few_points
 from doorstate.clouds.shape import check_single_cloud
 from doorstate.clouds.units import check_units
 from doorstate.doorways.crop import CropSpec, crop_cloud
 from doorstate.doorways.doorway import Doorway
-from doorstate.doorways.finder import find_doorways
+from doorstate.doorways.upright import find_upright_doorways
 from doorstate.errors import TooFewPointsError
 from doorstate.inference.abstention import Abstention
 from doorstate.inference.backends import CloudOutputs, run_by_size
@@ -104,18 +103,14 @@ class DoorwayPredictor(NetworkPredictor):
         abstention = None if self.gate is None else self.gate.check_view(clean.points, clean.outlier_share)
         if abstention is not None:
             return _Scene(clean.points, num_points, abstention)
-        level = level_cloud(
-            clean.points,
-            roll_deg=0.0 if known.is_level else None,
-            pitch_deg=0.0 if known.is_level else None,
-            camera_height_m=known.camera_height_m,
+        level, doorways = find_upright_doorways(
+            clean.points, is_level=known.is_level, camera_height_m=known.camera_height_m
         )
         if level.refusal is not None:
             abstention = Abstention(level.refusal.code, level.refusal.values, suggestions=_GIVE_TILT)
             return _Scene(level.points, num_points, abstention)
-        tilt = None if level.source in (None, "given") else Tilt.of(level)
+        tilt = None if level.source == "given" else Tilt.of(level)
         scene = _Scene(level.points, num_points, tilt=tilt)
-        doorways = find_doorways(level.points, level.floor_z_m)
         if known.hint is None:
             return self._crop(scene, doorways, set(doorways) if known.has_door else set())
         if level.floor_z_m is None:

@@ -17,7 +17,7 @@ class Tilt(NamedTuple):
 
     roll_deg: float
     pitch_deg: float
-    source: str  # floor or walls
+    source: str  # floor, walls or doorways
     error_deg: float | None = None
 
     @classmethod

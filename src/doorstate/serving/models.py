@@ -29,7 +29,7 @@ class TiltResponse(BaseModel):
 
     roll_deg: float = Field(description="Clockwise rotation of the camera, seen from behind.")
     pitch_deg: float = Field(description="Angle by which the camera looks down.")
-    tilt_from: str = Field(description="Surfaces that it was found from: floor or walls.")
+    tilt_from: str = Field(description="What it was found from: floor, walls or doorways.")
     error_deg: float | None = Field(None, description="Standard error.")
 
 
