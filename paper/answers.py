@@ -21,12 +21,17 @@ from doorstate.io.depth import depth_to_points
 from doorstate.networks.answers import ANSWERS_FILE, AnswerCount
 from doorstate.simulation.frames import level, replay
 from doorstate.simulation.presets import PRESETS, draw_rows
-from doorstate.types import NO_DOOR, STATES, Points
+from doorstate.types import STATES, Points
 
 from . import paths
 from .pages.real import read_frames
 
 SEED = 1_000_003  # of no data set
+OTHERS = (
+    "no-door",
+    "corridor",
+    "two-doors",
+)  # presets with no door or several, of which one would be asked about
 GAZEBO = paths.REPOSITORY / "tests" / "fixtures" / "gazebo"
 Example = tuple[str, Points]
 """True state and cloud."""
@@ -92,9 +97,9 @@ def _gazebo_scenes() -> list[dict[str, Any]]:
 
 
 def trained_presets(trained_on: str) -> list[str]:
-    """Return the presets with a door among the data sets of a card, such as `varied + cluttered + no-door, ...`."""
+    """Return the presets with one door among the data sets of a card, such as `varied + cluttered + no-door, ...`."""
     names = [name.strip() for name in trained_on.partition(",")[0].split("+")]
-    return [name for name in names if name in PRESETS and name != NO_DOOR.replace("_", "-")]
+    return [name for name in names if name in PRESETS and name not in OTHERS]
 
 
 def simulated_doors(presets: list[str], count: int) -> Iterator[Example]:

@@ -42,7 +42,7 @@ def test_clean_frames_hold_doors_in_all_states() -> None:
 
 
 def test_presets_follow_from_the_card() -> None:
-    text = "varied + cluttered + no-door, protocol by-scene, fold 0, and 20749 samples besides"
+    text = "varied + cluttered + corridor + no-door, protocol by-scene, fold 0, and 20749 samples besides"
     assert trained_presets(text) == ["varied", "cluttered"]
     assert trained_presets("ogurob, protocol all, fold 0") == ["ogurob"]
     assert [state for state, _ in simulated_doors(["ogurob"], 3)] == ["closed", "semi_open", "open"]
