@@ -12,8 +12,8 @@ from doorstate.doorways.doorway import Doorway
 from doorstate.doorways.finder import find_doorways
 from doorstate.types import Points
 
-# A wall that lies on its side shows no likely doorway: of 530 views of cameras that were level, tilted or on their side,
-# these limits accepted no wrong tilt (paper/log.md).
+# A wall that lies on its side shows no likely doorway: in 530 views of cameras that were level, tilted or on their
+# side, these limits accepted no wrong tilt (paper/log.md).
 _MIN_SCORE = 0.7
 _MAX_OTHER = 0.5  # score of the other direction, in parts of the better one's
 
