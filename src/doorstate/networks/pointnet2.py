@@ -18,6 +18,7 @@ from doorstate.networks.kernels.ball_query import ball_query
 from doorstate.networks.kernels.gather import first_rows, gather_rows
 from doorstate.networks.kernels.knn import knn
 from doorstate.networks.kernels.precision import full_precision
+from doorstate.networks.layers.ball_pooling import pool_balls
 from doorstate.networks.layers.batch_norm import RowBatchNorm, set_batchnorm
 from doorstate.networks.layers.dense import Dense, classification_head, glorot
 from doorstate.networks.layers.point_mlp import PooledMLP
@@ -78,6 +79,9 @@ class SetAbstraction(nn.Module):
         centres = first_rows(points, self.num_centres)  # (B, M, 3)
         pooled = []
         for indices, mlp in zip(neighbourhoods, self.mlps, strict=True):
+            if torch.compiler.is_exporting():
+                pooled.append(pool_balls(mlp, points, centres, features, indices))
+                continue
             offsets = gather_rows(points, indices) - centres.unsqueeze(2)  # (B, M, K, 3)
             pooled.append(mlp(offsets, features, indices))  # (B, M, C)
         return centres, torch.cat(pooled, dim=-1)

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from unittest.mock import patch
+
 import pytest
 import torch
 from hypothesis import given, settings
@@ -39,6 +41,8 @@ def test_ball_query_equals_its_plain_twin(seed: int, radius: float, num_samples:
     centres = points[:, :4]
     expected = plain.ball_query(centres, points, radius, num_samples)
     assert torch.equal(ball_query(centres, points, radius, num_samples), expected)
+    with patch("torch.compiler.is_exporting", return_value=True):
+        assert torch.equal(ball_query(centres, points, radius, num_samples), expected)
 
 
 def test_a_centre_is_at_zero_offset_in_its_own_ball() -> None:

@@ -65,8 +65,9 @@ def _first_hits_of_all(centres: Tensor, points: Tensor, radius: float, num_sampl
     num_points = points.shape[1]
     k = num_samples if num_points >= num_samples else num_points
     hits = coordinate_distances(centres, points) < radius**2
-    index = torch.where(hits, torch.arange(num_points, device=points.device), num_points)
-    index = index.topk(k, largest=False).values  # (B, M, k), num_points where there are no more
+    # The first points count most, the others nothing. As float32, which onnxruntime sorts faster than integers.
+    countdown = torch.arange(num_points, 0, -1, device=points.device, dtype=torch.float32)
+    index = num_points - (hits.to(torch.float32) * countdown).topk(k).values.to(torch.int64)  # (B, M, k)
     first = index[..., :1]
-    index = torch.where(index < num_points, index, first)
+    index = torch.where(index < num_points, index, first)  # there are no more
     return torch.cat([index, first.expand(-1, -1, num_samples - k)], dim=-1)
