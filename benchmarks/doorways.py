@@ -20,6 +20,7 @@ from doorstate._jobs import Progress
 from doorstate._memory import keep_freed_memory
 from doorstate.clouds.leveling import level_cloud
 from doorstate.clouds.outliers import remove_outliers
+from doorstate.doorways import upright
 from doorstate.doorways.crop import CROP_POINTS
 from doorstate.doorways.finder import FinderSettings, find_doorways, thinned
 from doorstate.errors import ConfigError
@@ -45,8 +46,8 @@ HEADS = ("door", "angle", "hinge", "frame", "widths")
 _STAGES: dict[str, tuple[object, str]] = {
     "outliers": (predictor, "remove_outliers"),
     "view": (Gate, "check_view"),
-    "level": (doorway_predictor, "level_cloud"),
-    "find": (doorway_predictor, "find_doorways"),
+    "level": (upright, "level_cloud"),
+    "find": (upright, "find_doorways"),
     "crops": (doorway_predictor, "crop_cloud"),
     "network": (doorway_predictor, "wait"),
     "decide": (doorway_predictor, "decide_doors"),
@@ -181,7 +182,7 @@ def _predictor(backend: Backend, weights: Path | None) -> DoorwayPredictor:
 def _best_candidates(number: int) -> Iterator[None]:
     """Let predictors take the `number` best candidates within the block, however improbable."""
     settings = FinderSettings(most=number, min_score=0.0)
-    with patch.object(doorway_predictor, "find_doorways", partial(find_doorways, settings=settings)):
+    with patch.object(upright, "find_doorways", partial(find_doorways, settings=settings)):
         yield
 
 
