@@ -7,7 +7,7 @@ Qi et al., 2017, arXiv:1706.02413, figure 2.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import torch
 from torch import Tensor, nn
@@ -80,7 +80,7 @@ class SetAbstraction(nn.Module):
         pooled = []
         for indices, mlp in zip(neighbourhoods, self.mlps, strict=True):
             if torch.compiler.is_exporting():
-                pooled.append(pool_balls(mlp, points, centres, features, indices))
+                pooled.append(pool_balls(cast(PooledMLP, mlp), points, centres, features, indices))
                 continue
             offsets = gather_rows(points, indices) - centres.unsqueeze(2)  # (B, M, K, 3)
             pooled.append(mlp(offsets, features, indices))  # (B, M, C)

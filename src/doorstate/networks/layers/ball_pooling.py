@@ -57,4 +57,5 @@ def pool_balls(
     largest = pooled_mlp.pool(hidden.view(-1, size, hidden.shape[-1]))  # (used runs, C')
     # A run that is not used stands for the last used one before it, which is of the same ball.
     last = is_used.cumsum(0) - 1
-    return largest.index_select(0, last).view(batch, num_balls, runs_a_ball, -1).amax(2)
+    pooled: Tensor = largest.index_select(0, last).view(batch, num_balls, runs_a_ball, -1).amax(2)
+    return pooled
