@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Sequence
+from dataclasses import replace
 from datetime import date
 from pathlib import Path
 
@@ -12,9 +14,12 @@ from doorstate._files import write_compressed_text, write_text
 from doorstate._jobs import Progress
 from doorstate.dataset.labelled import labelled_frames
 from doorstate.evaluation.frames import evaluate_frames
+from doorstate.inference.known import Known
 from doorstate.inference.network_predictor import NetworkPredictor
+from doorstate.inference.prediction import Prediction
 from doorstate.inference.predictor import DEFAULT_NETWORK, Predictor
 from doorstate.rules import list_rules
+from doorstate.types import Points
 
 from . import paths
 
@@ -35,6 +40,21 @@ COLUMNS = (
 )
 
 
+class DoorKnown(Predictor):
+    """Method that is told that a door is in view."""
+
+    def __init__(self, method: Predictor) -> None:
+        self._method = method
+
+    @property
+    def name(self) -> str:
+        """Name of the method."""
+        return f"{self._method.name}, door known"
+
+    def _predict(self, clouds: Sequence[Points], known: Known) -> list[Prediction]:
+        return self._method._predict(clouds, replace(known, door=True))
+
+
 def publish_frames(recordings: Path, progress: Progress) -> Path:
     """Evaluate labelled recordings, and write predictions and their origin into results/real.
 
@@ -43,7 +63,8 @@ def publish_frames(recordings: Path, progress: Progress) -> Path:
         progress: called after each frame.
     """
     network = NetworkPredictor.from_weights(DEFAULT_NETWORK)
-    predictors: dict[str, Predictor] = {DEFAULT_NETWORK: network}
+    known = DoorKnown(network)
+    predictors: dict[str, Predictor] = {DEFAULT_NETWORK: network, known.name: known}
     predictors |= {name: Predictor.load(rule=name) for name in list_rules()}
     frames = labelled_frames(recordings)
     results = evaluate_frames(predictors, frames, progress)
