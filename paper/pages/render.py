@@ -13,12 +13,13 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from doorstate._files import write_text
 
 from ..paths import DOCS, TITLES
-from . import commands, generalization, real, related, results, zoo
+from . import commands, doorways, generalization, real, related, results, zoo
 
 PAGES: Mapping[str, Callable[[], Mapping[str, Any]]] = {
     "results": results.content,
     "related": related.content,
     "generalization": generalization.content,
+    "doorways": doorways.content,
     "real": real.content,
     "zoo": zoo.content,
     "commands": commands.content,
