@@ -49,7 +49,7 @@ _STAGES: dict[str, tuple[object, str]] = {
     "level": (upright, "level_cloud"),
     "find": (upright, "find_doorways"),
     "crops": (doorway_predictor, "crop_cloud"),
-    "network": (doorway_predictor, "wait"),
+    "network": (doorway_predictor, "run_by_size"),
     "decide": (doorway_predictor, "decide_doors"),
     "check": (Gate, "check_doorways"),
 }
@@ -57,9 +57,8 @@ STAGES = (*_STAGES, "other", "total", "processor")
 _EACH = ("crops", "check")  # called for each candidate or door
 _NOTE = (
     "Milliseconds of one `Predictor` call on a simulated 640 × 480 cloud of the Xtion in memory, median; *total* with "
-    "its 90th percentile, *crops* and *check* with the time of one. *View* is the gate for the whole view, *network* "
-    "the time that the network takes after the last crop is cut out: it evaluates the others before. *Decide* places "
-    "and merges the answers, *check* looks at each door, *processor* is the time of all threads together. The "
+    "its 90th percentile, *crops* and *check* with the time of one. *View* is the gate for the whole view, *decide* "
+    "places and merges the answers, *check* looks at each door, *processor* is the time of all threads together. The "
     "finder is asked for its best *candidates*, however improbable. {answers} The last columns are the check of a door "
     "at the best candidate, by the state it is said to have. *onnxruntime* is the same network as `doorstate export` "
     "writes it."

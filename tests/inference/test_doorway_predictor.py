@@ -44,12 +44,14 @@ def cloud() -> Points:
     return room()
 
 
-def test_doors_are_in_order_of_remoteness(cloud: Points, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_doors_are_in_order_of_remoteness_after_one_call_of_the_network(
+    cloud: Points, monkeypatch: pytest.MonkeyPatch
+) -> None:
     script = [outputs("closed"), outputs("open"), outputs("semi_open", 0.1)]
     predictor = scripted_predictor(monkeypatch, [LEFT, AHEAD, RIGHT], script)
     prediction = predictor(cloud)
     assert isinstance(predictor.backend, ScriptedBackend)
-    assert predictor.backend.batches == 3 * [(1, 128, 3)]
+    assert predictor.backend.batches == [(3, 128, 3)]
     assert [door.state for door in prediction.doors] == [DoorState.OPEN, DoorState.CLOSED]
     assert prediction.state is DoorState.OPEN
     assert prediction.frame == prediction.doors[0].frame
@@ -61,13 +63,15 @@ def test_doors_are_in_order_of_remoteness(cloud: Points, monkeypatch: pytest.Mon
     assert prediction.tilt is None
 
 
-def test_a_batch_keeps_its_order(cloud: Points, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_batch_passes_the_network_together_and_keeps_its_order(
+    cloud: Points, monkeypatch: pytest.MonkeyPatch
+) -> None:
     script = [outputs("closed"), outputs("open"), outputs("semi_open"), outputs("open")]
     predictor = scripted_predictor(monkeypatch, [AHEAD, LEFT], script)
     empty = np.full((40, 40, 3), np.nan, np.float32)
     first, blank, second = predictor.batch([cloud, empty, cloud])
     assert isinstance(predictor.backend, ScriptedBackend)
-    assert predictor.backend.batches == 4 * [(1, 128, 3)]
+    assert predictor.backend.batches == [(4, 128, 3)]
     assert [door.label for door in first.doors] == ["closed", "open"]
     assert [door.label for door in second.doors] == ["semi_open", "open"]
     assert (blank.state, blank.num_points, blank.doors) == (None, 0, ())

@@ -1,15 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Network for crops: from a raw, tilted cloud to every door in it.
 
-Each cloud is cleaned, checked, turned level and searched for doorways. A second thread runs the network on each crop
-while the next one is cut out. Its answers are placed in the level sensor frame, the likeliest of those that overlap,
-and checked one by one.
+Each cloud is cleaned, checked, turned level and searched for doorways; the crops of all candidates pass the network
+together. Its answers are placed in the level sensor frame, the likeliest of those that overlap, and checked one by one.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import Executor, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -49,7 +47,6 @@ class _Scene:
     tilt: Tilt | None = None
     doorways: tuple[Doorway, ...] = ()
     crops: tuple[PreparedCloud, ...] = ()  # of the doorways
-    outputs: tuple[Future[list[CloudOutputs]], ...] = ()  # for the crops, one each
     asked: frozenset[int] = frozenset()  # numbers of the doorways at the place of a known door
     refused: tuple[Door, ...] = ()  # candidates with too few points
 
@@ -86,21 +83,18 @@ class DoorwayPredictor(NetworkPredictor):
 
     def _predict(self, clouds: Sequence[Points], known: Known) -> list[Prediction]:
         started = self.clock()
-        with ThreadPoolExecutor(1) as network:
-            scenes = [self._search(check_single_cloud(cloud), known, network) for cloud in clouds]
-            wait([output for scene in scenes for output in scene.outputs])
-        predictions = [self._decide(scene, known.hint is not None) for scene in scenes]
+        scenes = [self._search(check_single_cloud(cloud), known) for cloud in clouds]
+        crops = [crop.points for scene in scenes for crop in scene.crops]
+        outputs = iter(run_by_size(self.backend, crops))
+        predictions = [
+            self._decide(scene, [next(outputs) for _ in scene.crops], known.hint is not None)
+            for scene in scenes
+        ]
         milliseconds = (self.clock() - started) * 1000 / max(1, len(scenes))
         return [replace(prediction, milliseconds=milliseconds) for prediction in predictions]
 
-    def _search(self, cloud: Points, known: Known, network: Executor | None = None) -> _Scene:
-        """Clean and level one cloud, unless it shows too little, and find and crop its doorways.
-
-        Args:
-            cloud: cloud of a checked shape.
-            known: what is known of it.
-            network: runs the network on each crop; None leaves the outputs away.
-        """
+    def _search(self, cloud: Points, known: Known) -> _Scene:
+        """Clean and level one cloud, unless it shows too little, and find and crop its doorways."""
         try:
             num_points = _check_points(cloud)
         except TooFewPointsError as error:
@@ -118,40 +112,27 @@ class DoorwayPredictor(NetworkPredictor):
         tilt = None if level.source == "given" else Tilt.of(level)
         scene = _Scene(level.points, num_points, tilt=tilt)
         if known.hint is None:
-            return self._crop(scene, doorways, set(doorways) if known.has_door else set(), network)
+            return self._crop(scene, doorways, set(doorways) if known.has_door else set())
         if level.floor_z_m is None:
             return replace(scene, abstention=Abstention("no_floor"))
         asked = hinted_doorways(doorways, known.hint, level.points, level.floor_z_m)
         others = [doorway for doorway in doorways if doorway not in asked]
-        return self._crop(scene, [*asked, *others], set(asked), network)
+        return self._crop(scene, [*asked, *others], set(asked))
 
-    def _crop(
-        self, scene: _Scene, doorways: Sequence[Doorway], asked: set[Doorway], network: Executor | None
-    ) -> _Scene:
+    def _crop(self, scene: _Scene, doorways: Sequence[Doorway], asked: set[Doorway]) -> _Scene:
         """Return the scene with its crops; candidates with too few points for the network are refused."""
-        kept, crops, outputs, refused = [], [], [], []
+        kept, crops, refused = [], [], []
         for doorway in doorways:
             try:
-                crop = self._enough(crop_cloud(scene.cloud, doorway, self.crop_spec))
+                crops.append(self._enough(crop_cloud(scene.cloud, doorway, self.crop_spec)))
+                kept.append(doorway)
             except TooFewPointsError as error:
                 refused.append(refused_candidate(doorway, Abstention.from_error(error)))
-                continue
-            kept.append(doorway)
-            crops.append(crop)
-            if network is not None:
-                outputs.append(network.submit(run_by_size, self.backend, [crop.points]))
-        return replace(
-            scene,
-            doorways=tuple(kept),
-            crops=tuple(crops),
-            outputs=tuple(outputs),
-            asked=frozenset(number for number, doorway in enumerate(kept) if doorway in asked),
-            refused=tuple(refused),
-        )
+        numbers = frozenset(number for number, doorway in enumerate(kept) if doorway in asked)
+        return replace(scene, doorways=tuple(kept), crops=tuple(crops), asked=numbers, refused=tuple(refused))
 
-    def _decide(self, scene: _Scene, has_hint: bool) -> Prediction:
+    def _decide(self, scene: _Scene, outputs: Sequence[CloudOutputs], has_hint: bool) -> Prediction:
         """Return the prediction of a scene from the outputs for its crops."""
-        outputs = [output for future in scene.outputs for output in future.result()]
         num_points = sum(len(crop.points) for crop in scene.crops) or scene.num_points
         abstention = scene.abstention
         if not all(output.are_valid() for output in outputs):
