@@ -33,6 +33,9 @@ _TOLERANCE = 2.5  # deviations of inverse depth
 _NOISE_QUANTILE = 0.4  # least share of the cells that hold a single plane
 _NOISE_LIMITS = 0.0007, 0.012  # 1 / m; of a perfect and of a poor camera
 _RIDGE = 1e-7
+# Multiplications of a matrix product that NumPy does in one thread. The others of a larger one go on spinning for 20 ms,
+# beside the network.
+_ONE_THREAD = 200_000
 _IDENTITY = np.eye(3)
 
 
@@ -102,7 +105,7 @@ def find_planes(sample: Points) -> list[ViewPlane]:
     free = np.ones(len(cells.qq), np.bool_)
     planes: list[ViewPlane] = []
     while fitting.size and len(planes) < _MAX_PLANES:
-        sizes = free.astype(np.float32) @ fitting
+        sizes = fitting[free].sum(axis=0)
         best = int(sizes.argmax())
         if sizes[best] < least:
             break
@@ -172,8 +175,15 @@ def _grow(
 def _misfits(cells: _Cells, planes: Floats) -> Floats:
     """Return the mean squared residual (K, P) of each cell from each plane (P, 3)."""
     squares = (planes[:, :, None] * planes[:, None, :]).reshape(-1, 9)
-    sums = cells.qq[:, None] - 2 * cells.uq @ planes.T + cells.uu.reshape(-1, 9) @ squares.T
-    misfits: Floats = sums / cells.counts[:, None]
+    factors = np.concatenate([squares, -2 * planes], axis=1).T  # (12, P)
+    sums = np.concatenate([cells.uu.reshape(-1, 9), cells.uq], axis=1)  # (K, 12)
+    misfits = np.empty((len(sums), len(planes)))
+    step = max(1, _ONE_THREAD // sums.size)
+    for first in range(0, len(planes), step):
+        part = slice(first, first + step)
+        np.matmul(sums, factors[:, part], out=misfits[:, part])
+    misfits += cells.qq[:, None]
+    misfits /= cells.counts[:, None]
     return misfits
 
 
