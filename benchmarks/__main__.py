@@ -132,9 +132,12 @@ def latency(
 def doorways(
     out: Out,
     weights: Annotated[
-        Path | None, typer.Option(help="Weights for doorways, .safetensors or .onnx; default: untrained.")
+        Path | None,
+        typer.Option(help="Weights for doorways, .safetensors or .onnx.  [default: the packaged ones]"),
     ] = None,
-    network: Annotated[str, typer.Option(help="Untrained network, without weights.")] = "pointnet2",
+    network: Annotated[
+        str | None, typer.Option(help="Untrained network of this name, in place of weights.")
+    ] = None,
     candidates: Annotated[
         str, typer.Option(help="Numbers of candidate doorways, separated by commas.")
     ] = "1,3,5,8",
@@ -147,16 +150,18 @@ def doorways(
     configure_torch(None, used=False)  # as `doorstate predict` does, before torch is imported
     from benchmarks.doorways import doorways_table, measure_doorways
     from doorstate.cli.progress import progress_bar
+    from doorstate.inference.predictor import DEFAULT_NETWORK
+    from doorstate.networks.packaged import packaged_weights
 
-    parse_networks(network)
+    if network is not None:
+        parse_networks(network)
+    source = network or weights or packaged_weights(DEFAULT_NETWORK)
     numbers_of_candidates = parse_integers("candidates", candidates, 1)
     numbers_of_threads = parse_integers("threads", threads, 1)
     with progress_bar("doorways") as progress:
-        rows = measure_doorways(
-            weights, network, numbers_of_candidates, numbers_of_threads, repeats, progress
-        )
-    table = doorways_table(rows, has_weights=weights is not None)
-    name = f"untrained {network}" if weights is None else weights.name
+        rows = measure_doorways(source, numbers_of_candidates, numbers_of_threads, repeats, progress)
+    table = doorways_table(rows, has_weights=isinstance(source, Path))
+    name = f"untrained {network}" if isinstance(source, str) else source.name
     store_results(out, "doorways", rows, table, weights=name, threads=threads, repeats=repeats)
 
 

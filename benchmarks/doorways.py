@@ -88,8 +88,7 @@ class _SureDoors:
 
 
 def measure_doorways(
-    weights: Path | None,
-    network: str,
+    source: Path | str,
     numbers_of_candidates: Sequence[int],
     numbers_of_threads: Sequence[int],
     repeats: int,
@@ -98,7 +97,7 @@ def measure_doorways(
     """Return the times of every stage.
 
     Args:
-        weights: file with weights for doorways; None takes an untrained network.
+        source: file with weights for doorways, or the name of a network, which is not trained then.
         network: name of the untrained network.
         numbers_of_candidates: candidates that the finder is asked for.
         numbers_of_threads: threads of the network.
@@ -113,7 +112,7 @@ def measure_doorways(
         for number, (threads, preset) in enumerate(settings):
             progress(number, len(settings))
             checks_ms = _measure_checks(clouds[preset], repeats)
-            for runtime, measured in _predictors(weights, network, threads, Path(folder)).items():
+            for runtime, measured in _predictors(source, threads, Path(folder)).items():
                 for candidates in numbers_of_candidates:
                     with torch_threads(threads), _best_candidates(candidates):
                         calls = [_stages_of_call(measured, clouds[preset]) for _ in range(repeats + 1)][1:]
@@ -150,31 +149,29 @@ def _stage_cell(row: Result, stage: str) -> str:
     return format_ms(median_ms)
 
 
-def _predictors(
-    weights: Path | None, network: str, threads: int, folder: Path
-) -> dict[str, DoorwayPredictor]:
+def _predictors(source: Path | str, threads: int, folder: Path) -> dict[str, DoorwayPredictor]:
     """Return the predictors by runtime; an exported network has one."""
-    if weights is not None and weights.suffix == ".onnx":
-        return {"onnxruntime": _predictor(load_backend(weights, threads), weights)}
-    if weights is None:
-        card = WeightsCard(network=network, num_points=CROP_POINTS, input="doorway", scale_m=1.5, heads=HEADS)
-        module = create_network(network)
+    if isinstance(source, Path) and source.suffix == ".onnx":
+        return {"onnxruntime": _predictor(load_backend(source, threads), source)}
+    if isinstance(source, str):
+        card = WeightsCard(network=source, num_points=CROP_POINTS, input="doorway", scale_m=1.5, heads=HEADS)
+        module = create_network(source)
         add_heads(module, HEADS)
         backend: Backend = TorchBackend(module, card)
     else:
-        backend = load_backend(weights, threads, "torch")
+        backend = load_backend(source, threads, "torch")
     path = folder / "network.onnx"
-    torch_predictor = _predictor(backend, weights)
+    torch_predictor = _predictor(backend, source)
     if not path.is_file() and backend.network is not None:
         clouds = reference_clouds(3, torch_predictor.num_points, cloud_input="doorway")
         export_onnx(path, backend.network, backend.card, clouds)
-    return {"torch": torch_predictor, "onnxruntime": _predictor(OnnxBackend(path, threads), weights)}
+    return {"torch": torch_predictor, "onnxruntime": _predictor(OnnxBackend(path, threads), source)}
 
 
-def _predictor(backend: Backend, weights: Path | None) -> DoorwayPredictor:
+def _predictor(backend: Backend, source: Path | str) -> DoorwayPredictor:
     if backend.card.input != "doorway":
-        raise ConfigError("weights for whole clouds", path=weights, field="weights", expected="for doorways")
-    return DoorwayPredictor(backend if weights is not None else _SureDoors(backend))
+        raise ConfigError("weights for whole clouds", path=source, field="weights", expected="for doorways")
+    return DoorwayPredictor(_SureDoors(backend) if isinstance(source, str) else backend)
 
 
 @contextmanager

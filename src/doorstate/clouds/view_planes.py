@@ -33,8 +33,8 @@ _TOLERANCE = 2.5  # deviations of inverse depth
 _NOISE_QUANTILE = 0.4  # least share of the cells that hold a single plane
 _NOISE_LIMITS = 0.0007, 0.012  # 1 / m; of a perfect and of a poor camera
 _RIDGE = 1e-7
-# Multiplications of a matrix product that NumPy does in one thread. The others of a larger one go on spinning for 20 ms,
-# beside the network.
+# Multiplications of a matrix product that NumPy does in one thread. The others of a larger one go on spinning for
+# 20 ms, beside the network.
 _ONE_THREAD = 200_000
 _IDENTITY = np.eye(3)
 
