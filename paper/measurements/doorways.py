@@ -176,10 +176,11 @@ def doorways_table(doors: Sequence[DoorResult], frames: Sequence[FrameResult]) -
 def by_source(
     doors: pd.DataFrame, frames: pd.DataFrame
 ) -> Iterator[tuple[dict[str, Any], pd.DataFrame, pd.DataFrame]]:
-    """Yield preset and sensor as columns of a table, and the doors and frames of each."""
+    """Yield preset and sensor as columns of a table, and the doors and frames of each and, at last, of all."""
     for (preset, sensor), of_frames in frames.groupby(["preset", "sensor"], sort=False):
         of_doors = doors[(doors["preset"] == preset) & (doors["sensor"] == sensor)]
         yield {"preset": preset, "sensor": sensor, "doors": len(of_doors)}, of_doors, of_frames
+    yield {"preset": "all", "sensor": "all", "doors": len(doors)}, doors, frames
 
 
 def errors_table(hits: Sequence[CandidateResult]) -> Table:
