@@ -98,7 +98,6 @@ def measure_doorways(
 
     Args:
         source: file with weights for doorways, or the name of a network, which is not trained then.
-        network: name of the untrained network.
         numbers_of_candidates: candidates that the finder is asked for.
         numbers_of_threads: threads of the network.
         repeats: calls that are measured.

@@ -27,11 +27,7 @@ from . import paths
 from .pages.real import read_frames
 
 SEED = 1_000_003  # of no data set
-OTHERS = (
-    "no-door",
-    "corridor",
-    "two-doors",
-)  # presets with no door or several, of which one would be asked about
+OTHERS = ("no-door", "corridor", "two-doors")  # presets with no door, or several
 GAZEBO = paths.REPOSITORY / "tests" / "fixtures" / "gazebo"
 Example = tuple[str, Points]
 """True state and cloud."""

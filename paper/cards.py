@@ -9,12 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from doorstate._documents import read_json
 from doorstate.clouds.augmentation import Augmentation
-from doorstate.dataset.crops import FINDER_SCORE
-from doorstate.evaluation.heads import head_errors, head_rows, score_four_labels
+from doorstate.evaluation.heads import head_errors, head_rows, score_four_labels, with_finder
 from doorstate.evaluation.method_scores import MACRO, score_states
 from doorstate.evaluation.results import Results
 from doorstate.networks.card import HeadErrors, WeightsCard
@@ -127,7 +124,5 @@ def _heads(results: Results, card: WeightsCard) -> dict[str, float]:
     no_door = four.loc[four["method"] == card.network, "no_door"].iloc[0]
     heads = {"no_door": float(no_door), **({} if rows is None else head_errors(rows))}
     if card.door_calibration is not None and rows is not None:
-        p_door, score = (rows[name].to_numpy(dtype=np.float64) for name in ("p_door", FINDER_SCORE))
-        together = rows.assign(p_door=card.door_calibration.probabilities(p_door, score))
-        heads["door_auroc_with_finder"] = head_errors(together)["door_auroc"]
+        heads["door_auroc_with_finder"] = head_errors(with_finder(rows, card.door_calibration))["door_auroc"]
     return heads

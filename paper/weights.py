@@ -15,9 +15,8 @@ from statistics import median
 import numpy as np
 
 from doorstate._files import write_text
-from doorstate.dataset.crops import FINDER_SCORE
 from doorstate.evaluation.calibration import calibrate, labels_and_probabilities, reliability
-from doorstate.evaluation.heads import door_calibration, head_rows, standard_errors
+from doorstate.evaluation.heads import door_calibration, head_rows, standard_errors, with_finder
 from doorstate.evaluation.predictions import load_results
 from doorstate.evaluation.resolution import fewest_points, score_resolution
 from doorstate.evaluation.results import Results
@@ -40,9 +39,8 @@ from .published import comparison, study
 FEWEST_POINTS = 1024
 LARGEST_LOSS = 0.002
 WRONG_SHARE = 0.05  # of validation samples with a state; a smaller share leaves few of them (paper/log.md)
-MIN_DOOR_PROBABILITY = (
-    0.4  # of a doorway: more loses doors of simulated frames, less adds false ones (paper/log.md)
-)
+# Of a doorway. More loses doors of simulated frames, less adds false ones (paper/log.md).
+MIN_DOOR_PROBABILITY = 0.4
 RECIPE_PROTOCOLS = ("paper", "by-pose")
 
 
@@ -180,9 +178,6 @@ def _likely_a_door(results: Results, network: str, doors: DoorCalibration | None
     rows = head_rows(results, network)
     if rows is None or "p_door" not in rows:
         return np.ones(len(tested), bool)
-    p_door = tested["p_door"].to_numpy(dtype=np.float64)
-    least = DECISION_THRESHOLD
-    if doors is not None:
-        least = doors.min_probability
-        p_door = doors.probabilities(p_door, tested[FINDER_SCORE].to_numpy(dtype=np.float64))
-    return p_door >= least
+    if doors is None:
+        return (tested["p_door"] >= DECISION_THRESHOLD).to_numpy()
+    return (with_finder(tested, doors)["p_door"] >= doors.min_probability).to_numpy()

@@ -125,7 +125,7 @@ def answered_frame(view: View, prediction: Prediction) -> AnsweredFrame:
 
 
 def doors_table(doors: Sequence[FoundDoor], frames: Sequence[AnsweredFrame]) -> Table:
-    """Return one row per preset and sensor: places and states of the doors, and false ones."""
+    """Return one row per preset and sensor, and one for all: places and states of the doors, and false ones."""
     lines = []
     results = _frame_of(FoundDoor, doors), _frame_of(AnsweredFrame, frames)
     for source, of_doors, answered in by_source(*results):

@@ -143,7 +143,7 @@ def measure_doorways(
 
 
 def doorways_table(doors: Sequence[DoorResult], frames: Sequence[FrameResult]) -> Table:
-    """Return recall, candidates and time by preset and sensor."""
+    """Return recall, candidates and time by preset and sensor, and of all."""
     lines = []
     for source, of_doors, part in by_source(pd.DataFrame(doors), pd.DataFrame(frames)):
         lines.append(

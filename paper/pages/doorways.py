@@ -11,7 +11,8 @@ import numpy as np
 import pandas as pd
 
 from doorstate.dataset.crops import FINDER_SCORE
-from doorstate.evaluation.heads import head_errors, head_rows
+from doorstate.evaluation.factors import preset_of
+from doorstate.evaluation.heads import head_errors, head_rows, with_finder
 from doorstate.evaluation.method_scores import summarize_methods
 from doorstate.evaluation.metrics import macro_f1
 from doorstate.evaluation.results import Results, RunRecord, predicted_column
@@ -32,6 +33,7 @@ from doorstate.types import NO_DOOR
 
 from ..published import comparison
 from .results import method_column
+from .targets import TARGET_COLUMNS, seen_by_xtion
 
 WEIGHTS = "doorways-longer"  # experiment of the default weights
 RULES = "doorways-rules"
@@ -43,12 +45,12 @@ _POSE = ("door_x_m", "door_y_m", "door_yaw_deg", "opening_width_m")
 def content() -> Mapping[str, Any]:
     """Return the values of the page."""
     results, card = comparison(WEIGHTS), read_card(packaged_weights(NETWORK))
-    run = results.runs_of(NETWORK)[0]
+    run, crops = results.runs_of(NETWORK)[0], tested_crops(results, card)
     return {
         "trained": int(run.metric("train_samples")),
         "protocols": protocols_table(PROTOCOLS).to_markdown(),
-        "targets": targets_table(results, card).to_markdown(),
-        "sources": sources_table(results, card).to_markdown(),
+        "targets": targets_table(results, crops).to_markdown(),
+        "sources": sources_table(results, crops).to_markdown(),
         "rules": rules_table(results, comparison(RULES)).to_markdown(),
     }
 
@@ -86,12 +88,9 @@ def tested_crops(results: Results, card: WeightsCard) -> pd.DataFrame:
     """
     rows = head_rows(results, NETWORK)
     assert rows is not None
-    score = rows[FINDER_SCORE].to_numpy(dtype=np.float64)
     assert card.door_calibration is not None
-    return rows.assign(
-        preset=rows["pose_id"].str.rsplit("-", n=2).str[0],
-        p_door_network=rows["p_door"],
-        p_door=card.door_calibration.probabilities(rows["p_door"].to_numpy(dtype=np.float64), score),
+    return with_finder(rows, card.door_calibration).assign(
+        preset=preset_of(rows),
         finder_error_m=np.hypot(rows["door_x_m"], rows["door_y_m"]),
         error_m=[_error_m(row, card) for row in rows.to_dict("records")],
     )
@@ -107,13 +106,12 @@ def _error_m(row: Mapping[Hashable, Any], card: WeightsCard) -> float:
     return float(np.hypot(along_m - row["door_x_m"], across_m - row["door_y_m"]))
 
 
-def targets_table(results: Results, card: WeightsCard) -> Table:
+def targets_table(results: Results, crops: pd.DataFrame) -> Table:
     """Build the table of targets and of the values that are reached."""
-    crops = tested_crops(results, card)
     doors = crops["state"] != NO_DOOR
     heads = head_errors(crops)
     tested = results.tested_by(NETWORK)
-    xtion = tested[(tested["sensor"] == "xtion") & tested["pose_id"].str.startswith("varied-")]
+    xtion = tested[seen_by_xtion(tested)]
     lines = [
         ("macro F1", "`varied` doors seen by an Xtion", len(xtion), 0.94, False, macro_f1(xtion), 4),
         ("AUROC of a door, with the finder", "all crops", len(crops), 0.985, False, heads["door_auroc"], 4),
@@ -133,22 +131,13 @@ def targets_table(results: Results, card: WeightsCard) -> Table:
     return Table.from_frame(
         "Targets",
         pd.DataFrame(lines, columns=columns),
-        (
-            label_column("metric"),
-            Column(
-                "samples", ("samples", "count"), lambda samples, count: f"{samples} ({count})", is_label=True
-            ),
-            Column(
-                "target", ("bound", "at_most"), lambda bound, at_most: f"{'≤' if at_most else '≥'} {bound:g}"
-            ),
-            Column("reached", ("value", "digits"), number),
-        ),
+        (*TARGET_COLUMNS, Column("reached", ("value", "digits"), number)),
     )
 
 
-def sources_table(results: Results, card: WeightsCard) -> Table:
+def sources_table(results: Results, crops: pd.DataFrame) -> Table:
     """Build the table of scores by preset and sensor."""
-    crops, tested = tested_crops(results, card), results.tested_by(NETWORK)
+    tested = results.tested_by(NETWORK)
     lines = []
     for (preset, sensor), rows in crops.groupby(["preset", "sensor"], sort=False):
         doors = tested[tested["sample_id"].isin(rows["sample_id"])]

@@ -71,12 +71,12 @@ class Target:
         return abs(estimate.value - self.bound) < estimate.margin
 
 
-def _seen_by_xtion(rows: pd.DataFrame) -> pd.Series[bool]:
+def seen_by_xtion(rows: pd.DataFrame) -> pd.Series[bool]:
     return (rows["sensor"] == "xtion") & rows["pose_id"].str.startswith("varied-") & _is_door(rows)
 
 
 def _seen_by_xtion_decidable(rows: pd.DataFrame) -> pd.Series[bool]:
-    return _seen_by_xtion(rows) & ~is_undecidable(rows)
+    return seen_by_xtion(rows) & ~is_undecidable(rows)
 
 
 def _any(rows: pd.DataFrame) -> pd.Series[bool]:
@@ -146,12 +146,12 @@ TARGETS = (
         _F1,
         "`varied` doors seen by an Xtion, 4096 points",
         0.97,
-        _seen_by_xtion,
+        seen_by_xtion,
         _macro_f1,
         digits=4,
         results=_at_4096,
     ),
-    Target(_F1, "the same doors, 1024 points", 0.97, _seen_by_xtion, _macro_f1, digits=4),
+    Target(_F1, "the same doors, 1024 points", 0.97, seen_by_xtion, _macro_f1, digits=4),
     Target(
         _F1,
         "decidable ones, 1024 points",
@@ -206,6 +206,14 @@ TARGETS = (
 )
 
 
+TARGET_COLUMNS = (
+    label_column("metric"),
+    Column("samples", ("samples", "count"), lambda samples, count: f"{samples} ({count})", is_label=True),
+    Column("target", ("bound", "at_most"), lambda bound, at_most: f"{'≤' if at_most else '≥'} {bound:g}"),
+)
+"""Columns of a metric, its samples with their number, and its bound."""
+
+
 def targets_frame(networks: Sequence[str]) -> pd.DataFrame:
     """Evaluate every network on every target.
 
@@ -243,9 +251,7 @@ def targets_frame(networks: Sequence[str]) -> pd.DataFrame:
 def targets_table(networks: Sequence[str]) -> Table:
     """Build the table of targets and of the values that every network reaches."""
     columns = (
-        label_column("metric"),
-        Column("samples", ("samples", "count"), lambda samples, count: f"{samples} ({count})", is_label=True),
-        Column("target", ("bound", "at_most"), lambda bound, at_most: f"{'≤' if at_most else '≥'} {bound:g}"),
+        *TARGET_COLUMNS,
         *(Column(TITLES[name], (name, f"{name}_margin", "digits"), _estimate) for name in networks),
         Column("reached by", ("reached", "undecided"), _reached_by),
     )

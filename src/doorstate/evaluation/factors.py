@@ -93,9 +93,17 @@ def _bins(values: Floats, edges: tuple[float, ...]) -> Indices:
     return bins
 
 
+def preset_of(frame: pd.DataFrame) -> pd.Series[str]:
+    """Return the preset of the scene of each row, "" where the manifest names no scene."""
+    preset: pd.Series[str] = (
+        text_values(frame, "scene_id").str.rsplit("-", n=2).str[0]
+    )  # of PRESET-SEED-INDEX
+    return preset
+
+
 def _sensor_and_preset(frame: pd.DataFrame) -> pd.Series[str]:
     """Return sensor and preset: one sensor may have seen the scenes of several presets."""
-    preset = text_values(frame, "scene_id").str.rsplit("-", n=2).str[0]  # of PRESET-SEED-INDEX
+    preset = preset_of(frame)
     sensor = text_values(frame, "sensor")
     return sensor.where((sensor == "") | (preset == ""), sensor + ", " + preset)
 

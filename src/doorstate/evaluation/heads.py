@@ -101,6 +101,12 @@ def door_calibration(results: Results, method: str) -> DoorCalibration | None:
     return fit_door_calibration(outputs[0], outputs[1], (own["state"] != NO_DOOR).to_numpy())
 
 
+def with_finder(rows: pd.DataFrame, calibration: DoorCalibration) -> pd.DataFrame:
+    """Return rows of crops whose `p_door` is that of network and finder together."""
+    outputs = (np.asarray(number_values(rows, name), np.float64) for name in ("p_door", FINDER_SCORE))
+    return rows.assign(p_door=calibration.probabilities(*outputs))
+
+
 def score_presence(results: Results) -> pd.DataFrame:
     """Count how often a network predicts a door: columns method, door (bool), kind, samples, predicted_door, share."""
     rows = []

@@ -11,6 +11,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -31,7 +33,8 @@ _MIN_WIDTH_M = 0.4  # of a door; a network that is unsure of all may give zero
 _MIN_OVERLAP = 0.25  # of the narrower opening; neighbouring doors share no more than a jamb
 
 
-class Answer(NamedTuple):
+@dataclass(frozen=True)
+class Answer:
     """Outputs of a network for the crop of a candidate."""
 
     doorway: Doorway
@@ -50,7 +53,7 @@ class Answer(NamedTuple):
         probability = self.door_probability
         return probability >= DECISION_THRESHOLD, probability * self.doorway.score, probability
 
-    @property
+    @cached_property
     def corrected(self) -> Corrected:
         """Correction of the candidate as it counts, with the errors that are left; none without heads for it."""
         heads, width_m = self.outputs.heads, self.outputs.heads.get("opening_width_m", 0.0)
@@ -61,7 +64,7 @@ class Answer(NamedTuple):
         network = self.network_errors if "door_x_m" in heads else None
         return weigh_correction(Correction(along_m, across_m, yaw_deg, wider_m), self.doorway.score, network)
 
-    @property
+    @cached_property
     def frame(self) -> DoorFrame:
         """Corrected pose in the level sensor frame."""
         along_m, across_m, yaw_deg, _ = self.corrected.correction
@@ -117,7 +120,7 @@ def _calibrate(answer: Answer, card: WeightsCard) -> Answer:
     if calibration is not None and "p_door" in heads:
         pair = (np.array([heads["p_door"]]), np.array([answer.doorway.score]))
         heads = {**heads, "p_door": float(calibration.probabilities(*pair)[0])}
-    return answer._replace(outputs=answer.outputs._replace(heads=heads), network_errors=card.errors)
+    return replace(answer, outputs=answer.outputs._replace(heads=heads), network_errors=card.errors)
 
 
 def _is_no_door(door: Door) -> bool:

@@ -31,9 +31,6 @@ class Corrected(NamedTuple):
     errors: PoseErrors
 
 
-NO_CORRECTION = Correction(0.0, 0.0, 0.0, 0.0)
-
-
 def weigh_correction(correction: Correction, score: float, network: HeadErrors | None) -> Corrected:
     """Return the correction that combines a candidate and a network, and the errors that are left.
 
