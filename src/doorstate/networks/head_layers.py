@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+import torch
 from torch import Tensor, nn
 
 from doorstate.errors import unknown_name
@@ -114,9 +115,12 @@ def joint_losses(
     """
     network.check_points(points)
     encoding = network.encode(points, neighbourhoods)
-    loss, logits = network.loss_from_encoding(encoding, labels, label_smoothing)
-    # The mean over no doors would be NaN.
-    losses = {STATE: loss if (labels >= 0).any() else logits.sum() * 0}
+    # The mean over no doors would be NaN. Without a branch, because a branch would wait for the device.
+    has_door = (labels >= 0).any()
+    loss, logits = network.loss_from_encoding(
+        encoding, labels.where(has_door, torch.zeros_like(labels)), label_smoothing
+    )
+    losses = {STATE: loss * has_door}
     for name, head in network.heads.items():
         target = targets[name]
         if isinstance(head, Head):

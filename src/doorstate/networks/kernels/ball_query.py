@@ -3,6 +3,7 @@
 
 Most balls are full after few points. The cloud is searched in runs of points, and a centre drops out when its slots
 are full; the hits are the same as those of a search of all points, because they are taken in index order.
+On another device than the CPU all points are searched.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import torch
 from torch import Tensor
 
 from doorstate.networks.kernels.distances import coordinate_distances
+from doorstate.networks.kernels.pieces import on_cpu, pieces
 from doorstate.networks.kernels.precision import at_least_float32, full_precision
 
 _POINTS_AT_ONCE = 512
@@ -32,6 +34,10 @@ def ball_query(centres: Tensor, points: Tensor, radius: float, num_samples: int)
     with full_precision(points):
         if torch.compiler.is_exporting():
             return _first_hits_of_all(centres, points, radius, num_samples)
+        if not on_cpu(points):
+            runs = pieces(centres.shape[1], points.shape[0] * points.shape[1], points)
+            found = [_first_hits_of_all(centres[:, run], points, radius, num_samples) for run in runs]
+            return torch.cat(found, dim=1)
         clouds = zip(centres, points, strict=True)
         return torch.stack([_first_hits(*cloud, radius, num_samples) for cloud in clouds])
 
@@ -61,7 +67,7 @@ def _first_hits(centres: Tensor, points: Tensor, radius: float, num_samples: int
 
 
 def _first_hits_of_all(centres: Tensor, points: Tensor, radius: float, num_samples: int) -> Tensor:
-    """Compute `ball_query` as one graph, whose shapes do not depend on the points."""
+    """Compute `ball_query` with shapes that do not depend on the points, as one graph."""
     num_points = points.shape[1]
     k = num_samples if num_points >= num_samples else num_points
     hits = coordinate_distances(centres, points) < radius**2

@@ -12,7 +12,7 @@ from torch import Tensor
 from doorstate.networks.kernels.distances import coordinate_distances, feature_distances
 from doorstate.networks.kernels.gather import gather_rows
 from doorstate.networks.kernels.knn_blocks import nearest_in_blocks
-from doorstate.networks.kernels.pieces import pieces
+from doorstate.networks.kernels.pieces import on_cpu, pieces
 from doorstate.networks.kernels.precision import at_least_float32, full_precision
 from doorstate.networks.kernels.spatial_order import BLOCK_SIZES, block_size, spatial_order
 
@@ -51,6 +51,7 @@ def knn(query: Tensor, points: Tensor, k: int, *, in_order: bool = False) -> Ten
 def _blocks_are_faster(query: Tensor, points: Tensor, k: int) -> bool:
     return (
         not torch.compiler.is_exporting()  # how many distances are needed depends on the points
+        and on_cpu(points)
         and points.dtype == torch.float32
         and points.shape[1] >= max(_FEWEST_POINTS, 8 * k)
         and query.shape == points.shape
@@ -64,8 +65,10 @@ def _nearest_of_all(query: Tensor, points: Tensor, k: int) -> Tensor:
     num_queries, num_points = query.shape[1], points.shape[1]
     # A graph would hold the operations of every piece.
     exporting = torch.compiler.is_exporting()
+    by_topk = exporting or on_cpu(points)
+    values_each = num_points if by_topk else len(points) * num_points
     neighbours = []
-    for piece in [slice(0, num_queries)] if exporting else pieces(num_queries, num_points):
+    for piece in [slice(0, num_queries)] if exporting else pieces(num_queries, values_each, points):
         queries = query[:, piece]
         distances = squared_distances(queries, points)  # (B, m, N)
         twins = points[:, piece]  # fewer than the queries, or none, if there are more queries than points
@@ -74,5 +77,16 @@ def _nearest_of_all(query: Tensor, points: Tensor, k: int) -> Tensor:
         column = same_index.view(1, -1, 1).expand_as(same)
         with_twin = distances[:, : twins.shape[1]]
         with_twin.scatter_(2, column, torch.where(same, -torch.inf, with_twin.gather(2, column)))
-        neighbours.append(distances.topk(k, largest=False).indices)
+        neighbours.append(distances.topk(k, largest=False).indices if by_topk else _smallest(distances, k))
     return torch.cat(neighbours, dim=1)
+
+
+def _smallest(distances: Tensor, k: int) -> Tensor:
+    """Return the (B, m, k) indices of the smallest distances, ties by index: `topk` leaves their order open."""
+    if distances.dtype != torch.float32:
+        return distances.sort(dim=2, stable=True).indices[..., :k]
+    bits = distances.view(torch.int32)
+    # Bits of positive floats sort as the floats do, those of negative ones in reverse.
+    keys = torch.where(bits < 0, bits ^ 0x7FFFFFFF, bits).long().bitwise_left_shift_(32)
+    keys.bitwise_or_(torch.arange(keys.shape[2], device=keys.device))
+    return keys.topk(k, largest=False).values.bitwise_and_(2**32 - 1)

@@ -17,7 +17,7 @@ from torch.autograd.function import once_differentiable
 from torch.nn import functional
 
 from doorstate.networks.kernels.gather import flat_rows
-from doorstate.networks.kernels.pieces import pieces
+from doorstate.networks.kernels.pieces import on_cpu, pieces
 from doorstate.networks.kernels.precision import autocast_type, full_precision, wants_gradient
 from doorstate.networks.kernels.winners import first_winner
 
@@ -47,7 +47,7 @@ def linear_max(rows: Tensor, weight: Tensor, bias: Tensor) -> Tensor:
 
 def _linear_amax(rows: Tensor, weight: Tensor) -> Tensor:
     out = rows.new_empty(len(rows), len(weight))
-    for piece in pieces(len(rows), rows.shape[1] * len(weight)):
+    for piece in pieces(len(rows), rows.shape[1] * len(weight), rows):
         torch.amax(functional.linear(rows[piece], weight), 1, out=out[piece])
     return out
 
@@ -57,8 +57,12 @@ class _LinearMax(torch.autograd.Function):
     def forward(ctx: Any, rows: Tensor, weight: Tensor) -> Tensor:
         out = rows.new_empty(len(rows), len(weight))
         winners = torch.empty(out.shape, dtype=torch.int64, device=rows.device)
-        for group, (largest, winner) in enumerate(zip(out, winners, strict=True)):
-            largest[:], winner[:] = _winner_in_groups(functional.linear(rows[group], weight))
+        if on_cpu(rows):
+            for group, (largest, winner) in enumerate(zip(out, winners, strict=True)):
+                largest[:], winner[:] = _winner_in_groups(functional.linear(rows[group], weight))
+        else:
+            for piece in pieces(len(rows), rows.shape[1] * len(weight), rows):
+                out[piece], winners[piece] = first_winner(functional.linear(rows[piece], weight))
         ctx.save_for_backward(rows, weight, winners)
         return out
 

@@ -59,7 +59,7 @@ class _LinearNormMax(torch.autograd.Function):
         outputs = outputs.view(*groups.shape[:2], -1)  # (G, K, C') normalised
         best = outputs.new_empty(len(groups), len(weight))
         winners = torch.empty(best.shape, dtype=torch.int64, device=groups.device)
-        for piece in pieces(len(groups), outputs[0].numel()):
+        for piece in pieces(len(groups), outputs[0].numel(), groups):
             best[piece], winners[piece] = first_winner(outputs[piece])
         ctx.save_for_backward(groups, signed, outputs, winners, best, scale, sign, inverse)
         variance = inverse.square().reciprocal() - eps
@@ -78,7 +78,7 @@ class _LinearNormMax(torch.autograd.Function):
         factor, won = factor.to(kind), (slope * grad).to(kind).unsqueeze(1)  # (C',), (G, 1, C')
         weight_grad = scale.new_zeros(signed.shape)
         groups_grad = torch.empty_like(groups) if ctx.needs_input_grad[0] else None
-        for piece in pieces(len(groups), outputs[0].numel()):
+        for piece in pieces(len(groups), outputs[0].numel(), groups):
             inner = torch.addcmul(constant, outputs[piece], factor)  # (g, K, C')
             place = winners[piece].unsqueeze(1)
             put_along(inner, place, inner.gather(1, place) + won[piece])

@@ -40,7 +40,7 @@ class _LinearReLU(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, rows: Tensor, weight: Tensor, bias: Tensor, kind: torch.dtype) -> Tensor:
         out = rows.new_empty(len(rows), len(weight), dtype=kind)
-        for piece in pieces(len(rows), len(weight)):
+        for piece in pieces(len(rows), len(weight), rows):
             out[piece] = torch.addmm(bias, rows[piece], weight.T).relu_()
         ctx.save_for_backward(rows, weight, out)
         return out
@@ -51,7 +51,7 @@ class _LinearReLU(torch.autograd.Function):
         rows, weight, out = ctx.saved_tensors
         weight_grad, bias_grad = torch.zeros_like(weight), weight.new_zeros(len(weight))
         rows_grad = torch.empty_like(rows) if ctx.needs_input_grad[0] else None
-        for piece in pieces(len(rows), len(weight)):
+        for piece in pieces(len(rows), len(weight), rows):
             inner = (grad[piece] * out[piece].sign()).to(rows.dtype)
             weight_grad += inner.T @ rows[piece]
             bias_grad += inner.sum(0)

@@ -32,7 +32,7 @@ class _MaxOverPoints(torch.autograd.Function):
         groups = values.flatten(0, -3)  # (G, K, C)
         out = groups.new_empty(len(groups), groups.shape[2])
         winners = torch.empty(out.shape, dtype=torch.int64, device=values.device)
-        for piece in pieces(len(groups), groups[0].numel()):
+        for piece in pieces(len(groups), groups[0].numel(), groups):
             out[piece], winners[piece] = first_winner(groups[piece])
         ctx.save_for_backward(winners)
         ctx.shape = values.shape

@@ -14,7 +14,7 @@ import torch
 from torch import Tensor
 from torch.autograd.function import once_differentiable
 
-from doorstate.networks.kernels.pieces import pieces
+from doorstate.networks.kernels.pieces import on_cpu, pieces
 
 
 def with_moments(rows: Tensor) -> tuple[Tensor, Tensor, Tensor]:
@@ -40,8 +40,10 @@ class _WithMoments(torch.autograd.Function):
         mean = rows.mean(0, dtype=wide)
         centre = mean.to(rows.dtype)
         covariance = torch.zeros(channels, channels, dtype=wide, device=rows.device)
-        for piece in pieces(count, 2 * channels):
-            centred = rows[piece] - centre
+        # The sum of a piece is rounded to the type of the rows. Large pieces, of a device, would leave that rounding.
+        kind = rows.dtype if on_cpu(rows) else wide
+        for piece in pieces(count, 2 * channels, rows):
+            centred = rows[piece].to(kind) - centre
             covariance += centred.T @ centred
         covariance = covariance / count - torch.outer(mean - centre, mean - centre)
         ctx.save_for_backward(rows, mean)
@@ -55,7 +57,7 @@ class _WithMoments(torch.autograd.Function):
         rounded = slope.to(grad.dtype)
         # The mean is multiplied by the rounded slope, as the rows are below, so that both cancel.
         constant = (mean_grad / len(rows) - mean @ rounded.to(slope.dtype)).to(grad.dtype)
-        for piece in pieces(len(rows), 2 * rows.shape[1]):
+        for piece in pieces(len(rows), 2 * rows.shape[1], rows):
             grad[piece].add_(torch.addmm(constant, rows[piece], rounded))
         return grad
 

@@ -36,7 +36,7 @@ def _neighbour_amax(values: Tensor, indices: Tensor) -> Tensor:
     batch, num_queries, k = indices.shape
     flat, rows = values.flatten(0, 1), flat_rows(values, indices).flatten(0, 1)  # (B * N, C), (B * M, k)
     out = flat.new_empty(len(rows), flat.shape[1])
-    for piece in pieces(len(rows), k * flat.shape[1]):
+    for piece in pieces(len(rows), k * flat.shape[1], flat):
         torch.amax(flat.index_select(0, rows[piece].flatten()).view(-1, k, flat.shape[1]), 1, out=out[piece])
     return out.view(batch, num_queries, -1)
 
@@ -49,7 +49,7 @@ class _NeighbourMax(torch.autograd.Function):
         channels = flat.shape[1]
         out = flat.new_empty(len(rows), channels)
         winners = torch.empty(len(rows), channels, dtype=torch.int64, device=values.device)
-        for piece in pieces(len(rows), k * channels):
+        for piece in pieces(len(rows), k * channels, flat):
             neighbours = flat.index_select(0, rows[piece].flatten()).view(-1, k, channels)
             out[piece], slot = first_winner(neighbours)
             torch.gather(rows[piece], 1, slot, out=winners[piece])

@@ -20,6 +20,7 @@ from torch import Tensor
 from torch.autograd.function import once_differentiable
 from torch.nn import functional
 
+from doorstate.networks.kernels.pieces import on_cpu
 from doorstate.networks.kernels.precision import at_least_float32, full_precision
 
 # The first three levels of PointCNN have 192, 720 and 1920 values per neighbourhood, the last has 3840.
@@ -50,9 +51,9 @@ def separable(rows: Tensor, depthwise: Tensor, pointwise: Tensor) -> Tensor:
 def weigh_neighbours(rows: Tensor, weight: Tensor) -> Tensor:
     """Return the (B, P, m, C) weighted sums over neighbours, of (B, P, K, C) rows and (K, C, m) weights.
 
-    One pass over the rows in memory order; a product per channel would transpose them first.
+    One pass over the rows in memory order; on a CPU, a product per channel would transpose them first.
     """
-    if torch.compiler.is_exporting():
+    if torch.compiler.is_exporting() or not on_cpu(rows):
         return torch.einsum("bpkc,kcm->bpmc", rows, weight)
     return _weigh_neighbours(rows, weight)
 

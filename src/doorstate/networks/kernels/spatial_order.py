@@ -7,6 +7,7 @@ import torch
 from torch import Tensor
 
 from doorstate.networks.kernels.gather import gather_rows
+from doorstate.networks.kernels.pieces import on_cpu
 
 BLOCK_SIZES = range(12, 24)
 """Numbers of points of a block that make `knn_blocks` fast."""
@@ -15,8 +16,8 @@ BLOCK_SIZES = range(12, 24)
 def spatial_order(points: Tensor) -> Tensor:
     """Return an order in which every run of points lies together: the leaves of a k-d tree with equal halves.
 
-    Only the time of later searches depends on it. An exported graph keeps the given order: it computes all
-    distances.
+    Only the time of later searches depends on it. An exported graph and devices other than the CPU keep the given
+    order: they compute all distances.
 
     Args:
         points: (B, N, D).
@@ -26,7 +27,7 @@ def spatial_order(points: Tensor) -> Tensor:
     """
     batch, num_points, dimensions = points.shape
     order = torch.arange(num_points, device=points.device).expand(batch, -1)
-    if torch.compiler.is_exporting():
+    if torch.compiler.is_exporting() or not on_cpu(points):
         return order
     size, smallest = num_points, block_size(num_points)
     while size > smallest:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Index of a maximum along axis 1, and scattering to such indices.
 
-`torch.max` with indices over an axis that is not the last compares one value at a time. The index is therefore found
-by vectorised passes: the smallest slot number among those whose value equals the maximum.
+On a CPU, `torch.max` with indices over an axis that is not the last compares one value at a time. The index is
+therefore found by vectorised passes: the smallest slot number among those whose value equals the maximum.
 """
 
 from __future__ import annotations
@@ -10,11 +10,16 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from doorstate.networks.kernels.pieces import on_cpu
+
 _BITS = {2: torch.int16, 4: torch.int32, 8: torch.int64}
 
 
 def first_winner(values: Tensor) -> tuple[Tensor, Tensor]:
     """Return the (G, C) maximum over axis 1 of (G, K, C) values, and the first index that has it, int64."""
+    if not on_cpu(values):
+        largest, winner = values.max(1)  # torch documents the index of the first maximum
+        return largest, winner
     num_points = values.shape[1]
     largest = values.amax(1, keepdim=True)
     if values.element_size() > 2:
