@@ -90,7 +90,7 @@ def doorway_gate_table(results: Sequence[CheckResult]) -> Table:
 
 
 def _result(preset: str, leaf: str, cloud: Points, door: TrueDoor) -> CheckResult:
-    true, opened = (_check(cloud, door, state) for state in (door.state, DoorState.OPEN))
+    true, opened = (_check(cloud, door, state) for state in (DoorState(door.state), DoorState.OPEN))
     is_open = opened.abstention is None
     refused = "" if true.abstention is None else true.abstention.code
     return CheckResult(preset, str(door.state), leaf, refused, is_open, is_open and bool(opened.leaf_seen))

@@ -52,6 +52,8 @@ class DoorState(StrEnum):
         return next((state for state in cls if state.value == name), None)
 
 
+UNKNOWN_STATE: Final = "unknown"  # label of a door whose state is not asked, such as a revolving door
+LabelledState = DoorState | Literal["unknown"]
 STATES: tuple[str, ...] = tuple(state.value for state in DoorState)
 NO_DOOR: Final = "no_door"  # label of a scene without a door; not a class of the networks
 DOOR, PARTS = "door", "parts"  # names of heads that several packages use

@@ -16,9 +16,12 @@ from doorstate.simulation.generate import with_sensor
 from doorstate.simulation.presets import PRESETS, draw_rows
 from doorstate.simulation.render import cut_range, render_behind_glass
 from doorstate.simulation.row import Row
-from doorstate.simulation.scene import Box
+from doorstate.simulation.scene import Box, Door
+from doorstate.simulation.scene.fittings import Fitting
+from doorstate.simulation.scene.scene import Scene
 from doorstate.simulation.sdf import sdf_world
 from doorstate.types import Part
+from tests.simulation.scene.doors_by_share import BI_FOLD, LIFT, REVOLVING
 
 ROWS = [draw_rows(preset, 0, 3)[-1] for preset in PRESETS.values()]
 GLASS = next(
@@ -26,6 +29,15 @@ GLASS = next(
     for rows in (draw_rows(PRESETS["varied"], 0, index) for index in range(99))
     if rows[0].door_kind == "full_glass"
 )
+KINDS = [
+    ROWS[0].model_copy(update={"scene": Scene(door=door), "opening_share": 0.4, "sample_id": door.kind})
+    for door in (
+        LIFT,
+        BI_FOLD.model_copy(update={"leaf_material": "dark"}),
+        REVOLVING.model_copy(update={"glass_panels": 2}),
+        Door(fittings=(Fitting(kind="vision_panel", middle_m=1.5, width_m=0.2, height_m=0.4),)),
+    )
+]
 
 
 def numbers(element: ET.Element, path: str) -> list[float]:
@@ -59,7 +71,7 @@ def read_camera(world: ET.Element) -> tuple[CameraPose, DepthCamera]:
 
 
 @pytest.mark.parametrize(
-    "row", [*ROWS, GLASS, draw_rows(PRESETS["ogurob"], 0, 700)[1]], ids=lambda row: row.sample_id
+    "row", [*ROWS, *KINDS, GLASS, draw_rows(PRESETS["ogurob"], 0, 700)[1]], ids=lambda row: row.sample_id
 )
 def test_a_world_reads_back_to_the_same_boxes_and_depth(row: Row) -> None:
     root = ET.fromstring(sdf_world(row, row.sample_id))

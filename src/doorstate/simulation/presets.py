@@ -128,7 +128,8 @@ def draw_rows(preset: Preset, seed: int, index: int) -> list[Row]:
     samples = []
     for number, opening in enumerate(drawn.openings):
         columns = main_columns(describe_door(scene.door, opening, camera, view.camera_height_m))
-        name = f"a{number}" if preset.name == "varied-angles" else columns["state"]
+        has_own_state = scene.door.has_state and preset.name != "varied-angles"
+        name = columns["state"] if has_own_state else f"a{number}"
         own = {"sample_id": f"{pose_id}-{name}", "other_doors": others[number]}
         samples.append(row.model_copy(update=columns | own))
     return samples

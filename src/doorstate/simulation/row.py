@@ -23,14 +23,15 @@ class Row(FrozenModel):
 
     The scene, opening, camera, pose, sensor, seed and name rebuild the frame; the other columns describe it. Poses are
     in the door frame, except `door_*`, which is the door frame in the sensor frame. Columns that do not apply are
-    empty: those of the door in scenes without one, angles of a sliding door, and `scene_id` where all samples of a data
-    set show the same scene. All columns of a door describe the main door; `other_doors` holds those beside it.
+    empty: those of the door in scenes without one, angles of a door that opens by a share, and `scene_id` where all
+    samples of a data set show the same scene. All columns of a door describe the main door; `other_doors` holds those
+    beside it. The state of folding and revolving doors is `unknown`.
     """
 
     sample_id: str
     pose_id: str
     scene_id: str = ""
-    state: Literal["closed", "semi_open", "open", "no_door"]
+    state: Literal["closed", "semi_open", "open", "no_door", "unknown"]
     ambiguous: bool = False  # between the ranges of two states
     scene_kind: str  # "door", or the kind of the feature
     door_kind: str = ""

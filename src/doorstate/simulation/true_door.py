@@ -10,7 +10,7 @@ from doorstate.simulation.draw.openings import state_of
 from doorstate.simulation.scene.box import Pose
 from doorstate.simulation.scene.clearance import passable_width_m
 from doorstate.simulation.scene.door import Door, DoorKind, Opening
-from doorstate.types import DoorState, Swing
+from doorstate.types import LabelledState, Swing
 
 
 class VisiblePixels(FrozenModel):
@@ -36,13 +36,13 @@ class TrueDoor(FrozenModel):
     width_m: Metres
     height_m: Metres
     kind: DoorKind
-    hinge: str  # of the active leaf; empty for a sliding door
+    hinge: str  # of the active leaf; empty for a door without an angle
     swing: Swing
-    state: DoorState
+    state: LabelledState
     ambiguous: bool  # between the ranges of two states
-    opening_angle_deg: Degrees | None  # of the active leaf; None for a sliding door
+    opening_angle_deg: Degrees | None  # of the active leaf; None for sliding, folding and revolving doors
     passive_angle_deg: Degrees | None  # of double doors only
-    opening_share: float | None  # of sliding doors only
+    opening_share: float | None  # of these
     passable_width_m: Metres
     visible_px: VisiblePixels = VisiblePixels()
 
@@ -74,12 +74,12 @@ def describe_door(door: Door, opening: Opening, camera: Pose, camera_height_m: f
         width_m=door.opening_width_m,
         height_m=door.opening_height_m,
         kind=door.kind,
-        hinge="" if door.is_sliding else door.hinge,
+        hinge="" if door.opens_by_share else door.hinge,
         swing=door.swing,
         state=state,
         ambiguous=ambiguous,
-        opening_angle_deg=None if door.is_sliding else opening.angle_deg,
+        opening_angle_deg=None if door.opens_by_share else opening.angle_deg,
         passive_angle_deg=opening.passive_angle_deg if door.is_double else None,
-        opening_share=opening.share if door.is_sliding else None,
+        opening_share=opening.share if door.opens_by_share else None,
         passable_width_m=round(passable_width_m(door, opening), 4),
     )

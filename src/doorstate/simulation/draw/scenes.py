@@ -112,8 +112,8 @@ def _draw_door_scene(stream: Stream, any_opening: bool) -> DrawnScene:
 
 
 def turning_deg(door: Door, walls: list[Box]) -> float:
-    """Return the free angle between walls; 180 for a sliding door that opens fully, 0 for one that does not."""
-    if door.is_sliding:
+    """Return the free angle between walls; for a door that opens by a share 180 if it can do so fully, or else 0."""
+    if door.opens_by_share:
         blocked = collide(frame_and_leaf_boxes(door, Opening(share=1.0)), walls)
         return 0.0 if blocked else 180.0
     return free_angle_deg(door, walls)

@@ -8,11 +8,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import chain
 
 from doorstate.simulation.scene.box import Box, mirror, place
 from doorstate.simulation.scene.door import Door, Opening
+from doorstate.simulation.scene.folding import folding_panels
 from doorstate.simulation.scene.frame import frame_boxes
 from doorstate.simulation.scene.leaf import hinged_leaf, leaf_widths_m, sliding_leaf
+from doorstate.simulation.scene.revolving import revolving_wings
 from doorstate.simulation.scene.wall import Gap, door_gap, wall_boxes
 
 
@@ -22,7 +25,7 @@ def door_boxes(door: Door, opening: Opening, neighbours: Sequence[Gap] = ()) -> 
 
 
 def fixed_boxes(door: Door, neighbours: Sequence[Gap] = ()) -> list[Box]:
-    """Return the parts that do not move: wall, frame, threshold and track.
+    """Return the parts that do not move: wall, frame, threshold, track and drum.
 
     Args:
         door: door in its wall.
@@ -41,16 +44,27 @@ def frame_and_leaf_boxes(door: Door, opening: Opening) -> list[Box]:
 
 
 def leaf_boxes(door: Door, opening: Opening) -> list[Box]:
-    """Return the leaves with their handles."""
+    """Return the leaves with their fittings and handles."""
     if door.is_sliding:
-        leaf = place(sliding_leaf(door), -opening.share * door.opening_width_m, 0.0, 0.0)
-        return _to_hinge_and_swing(leaf, door)
+        return _to_hinge_and_swing(_sliding_leaves(door, opening.share), door)
+    if door.kind == "folding":
+        return _to_hinge_and_swing(list(chain.from_iterable(folding_panels(door, opening.share))), door)
+    if door.kind == "revolving":
+        return _to_hinge_and_swing(revolving_wings(door, opening.share), door)
     active_m, passive_m = leaf_widths_m(door)
     boxes = turn_leaf(door, hinged_leaf(door, active_m, door.handle), opening.angle_deg)
     if door.is_double:
         passive = hinged_leaf(door, passive_m, None)
         boxes += mirror(turn_leaf(door, passive, opening.passive_angle_deg), x=True)
     return _to_hinge_and_swing(boxes, door)
+
+
+def _sliding_leaves(door: Door, share: float) -> list[Box]:
+    leaf = sliding_leaf(door)
+    if door.kind == "sliding":
+        return place(leaf, -share * door.opening_width_m, 0.0, 0.0)
+    leaf = place(leaf, -share * door.opening_width_m / 2, 0.0, 0.0)
+    return [*leaf, *mirror(leaf, x=True)]
 
 
 def turn_leaf(door: Door, leaf: list[Box], angle_deg: float) -> list[Box]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Fixed parts of a door: jambs, casings, stop, threshold and the track of a sliding leaf.
+"""Fixed parts of a door: jambs, casings, stop, threshold, the track of a sliding leaf, or the drum of a revolving door.
 
 All are built with the hinge on the right and the leaf towards the robot; `door_boxes` mirrors them.
 """
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from doorstate.simulation.scene.box import Box
 from doorstate.simulation.scene.door import Door
+from doorstate.simulation.scene.drum import drum_boxes
 from doorstate.types import Part
 
 SLIDING_OVERLAP_M = 0.03  # of a leaf in front of the wall, at both sides and above
@@ -15,7 +16,9 @@ _TRACK_M = 0.05
 
 
 def frame_boxes(door: Door) -> list[Box]:
-    """Return jambs, casings, stop, threshold and track."""
+    """Return jambs, casings, stop, threshold and track, or the drum of a revolving door."""
+    if door.kind == "revolving":
+        return drum_boxes(door)
     half, height, wall = door.opening_width_m / 2, door.opening_height_m, door.wall_thickness_m
     jamb, casing, stop = door.jamb_thickness_m, door.casing_width_m, door.stop_width_m
     boxes = _portal(half, height, jamb, jamb, wall, -wall / 2)
@@ -30,7 +33,8 @@ def frame_boxes(door: Door) -> list[Box]:
     if door.is_sliding and door.leaf_recess_m < 0:
         z = height + SLIDING_OVERLAP_M + _TRACK_M / 2
         size = (2 * door.opening_width_m, -door.leaf_recess_m, _TRACK_M)
-        boxes.append(Box(Part.FRAME, (-half, -door.leaf_recess_m / 2, z), size))
+        middle = 0.0 if door.kind == "sliding_double" else -half
+        boxes.append(Box(Part.FRAME, (middle, -door.leaf_recess_m / 2, z), size))
     return boxes
 
 
