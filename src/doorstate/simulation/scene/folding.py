@@ -26,8 +26,9 @@ def folding_panels(door: Door, share: float) -> list[list[Box]]:
     # Panels overlap no more than a stack of two is thick.
     least_cos = min(1.0, (door.leaf_thickness_m + _STACKED_GAP_M) / width)
     turn = math.acos(1 - share * (1 - least_cos))
-    start = -door.opening_width_m / 2 + door.leaf_gap_m
-    # The pivot is in the panels' middle plane, so that both panels of a pair turn by the same angle.
+    # The pivot is in the panels' middle plane, so that both panels of a pair turn by the same angle, and moves off the
+    # jamb by as much as their edge would cut into it.
+    start = -door.opening_width_m / 2 + door.leaf_gap_m + door.leaf_thickness_m / 2 * math.sin(turn)
     y = -door.leaf_recess_m - door.leaf_thickness_m / 2
     apex = (start + width * math.cos(turn), y + width * math.sin(turn))
     first = place(_panel(door, width, 0, has_handle=False), start, y, turn)
