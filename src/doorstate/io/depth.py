@@ -29,17 +29,24 @@ def depth_to_points(
     Raises:
         CameraError: the image size is not that of the intrinsics.
     """
+    with np.errstate(over="ignore"):  # overflow gives infinity, which is "not measured"
+        points = np.ascontiguousarray(np.moveaxis(depth_coordinates(depth_m, intrinsics), 0, -1))
+        level = rotate(points, np.array(tilt_matrix(roll_deg, pitch_deg)))
+        return level.astype(np.float32, copy=False)
+
+
+def depth_coordinates(depth_m: NDArray[np.floating], intrinsics: Intrinsics) -> NDArray[np.float32]:
+    """Return x, y and z (3, H, W) of the points of an upright camera; arguments and errors are as above."""
     height, width = depth_m.shape
     intrinsics.check_image_size(width, height)
     depth = depth_m.astype(np.float64)
-    depth[~(np.isfinite(depth) & (depth > 0))] = np.nan
-    points = np.empty((height, width, 3), dtype=np.float32)
-    with np.errstate(over="ignore"):  # overflow gives infinity, which is "not measured"
+    with np.errstate(over="ignore"):
+        np.copyto(depth, np.nan, where=~(np.isfinite(depth) & (depth > 0)))
         left, up = intrinsics.rays()
         if intrinsics.distortion is not None:
             depth[np.isnan(left)] = np.nan
-        points[..., 0] = depth
-        points[..., 1] = depth * left
-        points[..., 2] = depth * up
-        level = rotate(points, np.array(tilt_matrix(roll_deg, pitch_deg)))
-        return level.astype(np.float32, copy=False)
+        coordinates = np.empty((3, height, width), dtype=np.float32)
+        coordinates[0] = depth
+        np.multiply(depth, left, out=coordinates[1], casting="same_kind")
+        np.multiply(depth, up, out=coordinates[2], casting="same_kind")
+    return coordinates

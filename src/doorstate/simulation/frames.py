@@ -5,15 +5,16 @@ from __future__ import annotations
 
 import hashlib
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from doorstate.io.depth import depth_to_points
+from doorstate.io.depth import depth_coordinates
 from doorstate.simulation.noise.model import sense
 from doorstate.simulation.noise.sensors import find_sensor
 from doorstate.simulation.noise.streams import sample_seed
-from doorstate.simulation.render import Render, render_behind_glass
+from doorstate.simulation.render import Render, render_states
 from doorstate.simulation.row import Row
 from doorstate.types import Points
 
@@ -28,12 +29,20 @@ class Frame(NamedTuple):
 
 def replay(row: Row) -> Frame:
     """Render the frame of a manifest row, bit for bit."""
-    pose, intrinsics = row.camera_pose(), row.camera.intrinsics()
-    boxes, sensor = row.boxes(), find_sensor(row.sensor)
-    full = render_behind_glass(boxes, pose, intrinsics)
-    cut = sense(sensor, full, boxes, pose, row.camera, sample_seed(row.seed, row.sample_id))
-    points = depth_to_points(cut.depth_m, intrinsics)
-    return Frame(full, cut, level(points, pose.pitch_rad, pose.roll_rad))
+    return replay_pose([row])[0]
+
+
+def replay_pose(rows: Sequence[Row]) -> list[Frame]:
+    """Render frames of one camera pose as `replay` does; what all of them show is rendered once."""
+    camera, pose, intrinsics = rows[0].camera, rows[0].camera_pose(), rows[0].camera.intrinsics()
+    states = [row.boxes() for row in rows]
+    frames = []
+    for row, boxes, full in zip(rows, states, render_states(states, pose, intrinsics), strict=True):
+        seed = sample_seed(row.seed, row.sample_id)
+        cut = sense(find_sensor(row.sensor), full, boxes, pose, camera, seed)
+        x_y_z = depth_coordinates(cut.depth_m, intrinsics)
+        frames.append(Frame(full, cut, level(np.moveaxis(x_y_z, 0, -1), pose.pitch_rad, pose.roll_rad)))
+    return frames
 
 
 def depth_sha256(frame: Frame) -> str:
@@ -49,12 +58,14 @@ def level(points: Points, pitch_rad: float, roll_rad: float = 0.0) -> Points:
         pitch_rad: positive looks down.
         roll_rad: positive turns the camera clockwise, as seen from behind it.
     """
+    x, y, z = np.moveaxis(points, -1, 0)
     if roll_rad:
         cos, sin = math.cos(roll_rad), math.sin(roll_rad)
-        x, y, z = points[..., 0], points[..., 1], points[..., 2]
-        points = np.stack([x, cos * y - sin * z, sin * y + cos * z], axis=-1).astype(np.float32)
-    if not pitch_rad:
+        y, z = cos * y - sin * z, sin * y + cos * z
+    if pitch_rad:
+        cos, sin = math.cos(pitch_rad), math.sin(pitch_rad)
+        x, z = cos * x + sin * z, cos * z - sin * x
+    elif not roll_rad:
         return points
-    cos, sin = math.cos(pitch_rad), math.sin(pitch_rad)
-    x, y, z = points[..., 0], points[..., 1], points[..., 2]
-    return np.stack([cos * x + sin * z, y, cos * z - sin * x], axis=-1).astype(np.float32)
+    # Each coordinate contiguous in memory, as geometry wants it (`clouds.coordinates`).
+    return np.moveaxis(np.stack([x, y, z]).astype(np.float32, copy=False), 0, -1)

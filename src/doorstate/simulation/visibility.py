@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from doorstate.io.camera import Intrinsics
-from doorstate.io.depth import depth_to_points
+from doorstate.io.depth import depth_coordinates
 from doorstate.simulation.camera import CameraPose
 from doorstate.simulation.frames import level
 from doorstate.simulation.render import Render
@@ -43,7 +43,7 @@ def opening_depth_m(pose: CameraPose, intrinsics: Intrinsics, width_m: float, he
     """
     # The point of a pixel at unit depth, in the gravity-aligned sensor frame, is the ray's direction.
     unit = np.ones((intrinsics.height, intrinsics.width), np.float32)
-    ray = level(depth_to_points(unit, intrinsics), pose.pitch_rad, pose.roll_rad)
+    ray = level(np.moveaxis(depth_coordinates(unit, intrinsics), 0, -1), pose.pitch_rad, pose.roll_rad)
     ray_y = math.sin(pose.yaw_rad) * ray[..., 0] + math.cos(pose.yaw_rad) * ray[..., 1]
     ray_x = math.cos(pose.yaw_rad) * ray[..., 0] - math.sin(pose.yaw_rad) * ray[..., 1]
     with np.errstate(divide="ignore", invalid="ignore"):

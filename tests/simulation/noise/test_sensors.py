@@ -26,7 +26,7 @@ from doorstate.errors import ConfigError
 from doorstate.simulation.camera import CAMERAS, CameraPose, DepthCamera
 from doorstate.simulation.noise.model import SensorModel, distort, sense
 from doorstate.simulation.noise.sensors import SENSORS, find_sensor
-from doorstate.simulation.render import NO_BOX, Render, cut_range, render_behind_glass
+from doorstate.simulation.render import NO_BOX, cut_range, render_behind_glass
 from doorstate.simulation.scene import Box, Door, Opening, Scene, scene_boxes
 from doorstate.types import Part
 
@@ -84,10 +84,12 @@ def small(name: str) -> tuple[SensorModel, DepthCamera]:
 def test_a_measurement_depends_on_its_seed(name: str) -> None:
     model, camera = small(name)
     rendered = render_behind_glass(BOXES, POSE, camera.intrinsics())
-    before = [image.copy() for image in rendered]
+    before = [image.copy() for image in rendered[:3]]
     first, again, different = (sense(model, rendered, BOXES, POSE, camera, seed) for seed in (5, 5, 6))
-    assert all(np.array_equal(a, b) for a, b in zip(before, rendered, strict=True))
-    assert all(a.tobytes() == b.tobytes() and a.dtype == b.dtype for a, b in zip(first, again, strict=True))
+    assert all(np.array_equal(a, b) for a, b in zip(before, rendered[:3], strict=True))
+    assert all(
+        a.tobytes() == b.tobytes() and a.dtype == b.dtype for a, b in zip(first[:3], again[:3], strict=True)
+    )
     assert (first.depth_m.tobytes() == different.depth_m.tobytes()) == (name == "none")
     lost = np.isnan(first.depth_m)
     assert ((first.part == Part.NONE) == lost).all()
@@ -100,7 +102,7 @@ def test_the_sensor_none_keeps_the_rendering_bit_for_bit() -> None:
     camera = CAMERAS["xtion-gazebo"]
     rendered = render_behind_glass(BOXES, POSE, camera.intrinsics())
     result, clean = sense(SENSORS["none"], rendered, BOXES, POSE, camera, 1), cut_range(rendered, camera)
-    assert all(a.tobytes() == b.tobytes() for a, b in zip(result, clean, strict=True))
+    assert all(a.tobytes() == b.tobytes() for a, b in zip(result[:3], clean[:3], strict=True))
 
 
 def test_an_xtion_measurement_has_the_same_bits_on_every_machine() -> None:
@@ -228,5 +230,5 @@ def test_an_empty_scene_gives_no_depth_and_no_warning() -> None:
         pinhole = cropped(model, 12, 8)
         empty = render_behind_glass([], POSE, pinhole)
         assert not np.isfinite(distort(model, empty, [], POSE, pinhole, 0).depth_m).any()
-        nothing = Render(np.full_like(empty.depth_m, np.nan), empty.part, empty.box)
+        nothing = empty._replace(depth_m=np.full_like(empty.depth_m, np.nan))
         assert np.isnan(distort(model, nothing, [], POSE, pinhole, 0).depth_m).all()

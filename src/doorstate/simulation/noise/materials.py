@@ -10,9 +10,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from doorstate._models import FrozenModel
-from doorstate.io.camera import Intrinsics
-from doorstate.simulation.camera import CameraPose
-from doorstate.simulation.render import Render, is_made_of, render
+from doorstate.simulation.render import Render, is_made_of
 from doorstate.simulation.scene.box import Box
 from doorstate.types import DepthImage
 
@@ -31,8 +29,6 @@ def loss_shares(
     rendered: Render,
     incidence_rad: NDArray[np.float32],
     boxes: Sequence[Box],
-    pose: CameraPose,
-    intrinsics: Intrinsics,
 ) -> NDArray[np.float32] | None:
     """Return the probability of each pixel to be lost on its material.
 
@@ -41,8 +37,6 @@ def loss_shares(
         rendered: result of `render_behind_glass`.
         incidence_rad: (H, W), `render.incidence` of the same rendering.
         boxes: scene in the door frame, with the glass.
-        pose: camera in the door frame.
-        intrinsics: pinhole model of the camera.
 
     Returns:
         (H, W), or None if every box is matte.
@@ -56,9 +50,8 @@ def loss_shares(
     if "gloss" in kinds:
         mirrors = incidence_rad < np.radians(materials.gloss_mirror_deg)
         shares[is_made_of("gloss", rendered, boxes) & mirrors] = 1.0
-    if "glass" in kinds:
-        pane = is_made_of("glass", render(boxes, pose, intrinsics), boxes)
-        shares[pane] = 1 - (1 - materials.glass_lost) * (1 - shares[pane])
+    if rendered.pane is not None:
+        shares[rendered.pane] = 1 - (1 - materials.glass_lost) * (1 - shares[rendered.pane])
     return shares
 
 

@@ -104,7 +104,7 @@ def distort(
     """
     angle_rad = _incidence(model, rendered, boxes, pose, intrinsics)
     if model.materials is not None:
-        shares = loss_shares(model.materials, rendered, angle_rad, boxes, pose, intrinsics)
+        shares = loss_shares(model.materials, rendered, angle_rad, boxes)
         if shares is not None:
             patch_px, rng = model.materials.patch_px, stage_rng(seed, "materials")
             rendered = rendered._replace(depth_m=lose_patches(rendered.depth_m, shares, patch_px, rng))
