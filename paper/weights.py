@@ -28,7 +28,7 @@ from doorstate.networks.weights import load_weights, save_weights
 from doorstate.training.calibration import abstain_threshold, at_temperature
 from doorstate.training.comparison import read_comparison
 from doorstate.training.run_folder import run_of
-from doorstate.types import DECISION_THRESHOLD, NO_DOOR
+from doorstate.types import DECISION_THRESHOLD, STATES
 
 from . import paths
 from .cards import Evidence, Training, model_card
@@ -121,7 +121,7 @@ def test_evidence(experiment: str, network: str, trained_points: int) -> Evidenc
         sys.exit(f"results/{experiment}: no validation predictions of {network}")
     temperature = round(calibration.temperatures[0], 4)
     rows = results.predictions
-    validation = rows[(rows["method"] == network) & (rows["role"] == "val") & (rows["state"] != NO_DOOR)]
+    validation = rows[(rows["method"] == network) & (rows["role"] == "val") & rows["state"].isin(STATES)]
     labels, probabilities = labels_and_probabilities(validation)
     threshold = abstain_threshold(at_temperature(probabilities, temperature), labels, WRONG_SHARE)
     validated = load_results(paths.RUNS / experiment)  # published data sets have the tested samples only

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from pydantic import BaseModel, ValidationError
 
-from doorstate.types import STATES, DoorState
+from doorstate.types import LABELS, STATES, DoorState
 
 
 class Record(BaseModel):
@@ -62,3 +62,10 @@ def test_classes_are_numbered_as_in_published_files() -> None:
     for index in (-1, 3):
         with pytest.raises(ValueError, match="no class"):
             DoorState.from_index(index)
+
+
+def test_numbers_of_labels_are_those_of_stored_data_sets() -> None:
+    assert LABELS == ("closed", "semi_open", "open", "no_door", "unknown")
+    assert LABELS[: len(STATES)] == STATES
+    with pytest.raises(ValueError, match="unknown"):
+        DoorState("unknown")

@@ -18,6 +18,7 @@ from doorstate.inference.prediction import Prediction
 from doorstate.inference.predictor import Predictor
 from doorstate.simulation.true_door import TrueDoor
 from doorstate.simulation.truth import true_doors
+from doorstate.types import STATES
 
 from .doorways import (
     SEED,
@@ -131,6 +132,7 @@ def doors_table(doors: Sequence[FoundDoor], frames: Sequence[AnsweredFrame]) -> 
     for source, of_doors, answered in by_source(*results):
         error_m = of_doors["position_error_m"].dropna()
         found = of_doors.loc[error_m.index]
+        found = found[found["state"].isin(STATES)]
         with_state = found[found["predicted"].notna()]
         is_right = with_state["predicted"] == with_state["state"]
         lines.append(
@@ -175,7 +177,7 @@ def reasons_table(doors: Sequence[FoundDoor]) -> Table:
     lines = []
     for preset in dict.fromkeys(door.preset for door in doors):
         of_preset = [door for door in doors if door.preset == preset]
-        found = [door for door in of_preset if door.position_error_m is not None]
+        found = [door for door in of_preset if door.position_error_m is not None and door.state in STATES]
         with_state = [door for door in found if door.predicted is not None]
         lines.append(
             {

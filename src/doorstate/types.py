@@ -56,6 +56,8 @@ UNKNOWN_STATE: Final = "unknown"  # label of a door whose state is not asked, su
 LabelledState = DoorState | Literal["unknown"]
 STATES: tuple[str, ...] = tuple(state.value for state in DoorState)
 NO_DOOR: Final = "no_door"  # label of a scene without a door; not a class of the networks
+LABELS: tuple[str, ...] = (*STATES, NO_DOOR, UNKNOWN_STATE)
+"""Labels of samples; a label's position is its number in data sets. States come first: they are the classes."""
 DOOR, PARTS = "door", "parts"  # names of heads that several packages use
 DECISION_THRESHOLD = 0.5  # a probability of at least this is a yes
 ABSTAINED = "abstained"  # label of a prediction without a state

@@ -88,6 +88,20 @@ def test_a_candidate_near_a_door_hits_it(row: Row, along_m: float, turn_deg: flo
     assert line["state"] == ("semi_open" if is_hit else "no_door")
 
 
+def test_a_crop_of_a_door_of_unknown_state_shows_a_door(row: Row) -> None:
+    unknown = row.model_copy(
+        update={"state": "unknown", "hinge": "", "opening_angle_deg": None, "door_kind": "folding"}
+    )
+    lines = candidate_columns(unknown, [at_door(row), at_door(row, 2.0)], Crops())
+    assert [line["state"] for _, line in lines] == ["unknown", "no_door"]
+    door = lines[0][1]
+    assert (door["hinge"], door["opening_angle_deg"]) == ("", "")
+    assert float(door["door_x_m"]) == pytest.approx(0.0, abs=1e-4)
+    targets = head_targets([door], NORMALIZATIONS["doorway"].placement(np.zeros((1, 4, 3), np.float32)))
+    assert targets["door"][0, 0] == 1
+    assert np.isnan(targets["angle"]).all()
+
+
 def test_the_door_of_a_crop_is_in_its_frame(row: Row) -> None:
     ((_, line),) = candidate_columns(row, [at_door(row, 0.1, 5.0)], Crops())
     assert (line["sample_id"], line["frame_id"], line["candidate"]) == (

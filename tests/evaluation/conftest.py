@@ -18,7 +18,7 @@ from doorstate.dataset.store import CLOUDS_FILE, PARTS_FILE, PreparedDataset, op
 from doorstate.dataset.strata import distance_band, region
 from doorstate.simulation.manifest import MANIFEST_FILE, flatten
 from doorstate.simulation.presets import PRESETS, draw_rows
-from doorstate.types import NO_DOOR, STATES, Part
+from doorstate.types import LABELS, NO_DOOR, STATES, Part
 
 POSES = 40
 POINTS = 128
@@ -71,6 +71,18 @@ def with_empty_scenes(tmp_path_factory: pytest.TempPathFactory) -> PreparedDatas
     return _write_dataset(tmp_path_factory.mktemp("empty") / "data", rows, "imported")
 
 
+@pytest.fixture(scope="session")
+def with_unknown_states(tmp_path_factory: pytest.TempPathFactory) -> PreparedDataset:
+    """Twenty clouds of each label: doors of every state, no door, and doors whose state is not asked."""
+    rows = [
+        {"sample_id": f"{label}/{n}", "state": label, "door_kind": "revolving", "scene_kind": "door"}
+        | {"distance_band": "1.5-2.0", "region": "red"}
+        for n in range(20)
+        for label in LABELS
+    ]
+    return _write_dataset(tmp_path_factory.mktemp("unknown") / "data", rows, "imported")
+
+
 @pytest.fixture
 def make_comparison(tmp_path: Path) -> MakeComparison:
     """Write a comparison folder: all predictions correct, but for those in `wrong[network][sample_id]`."""
@@ -99,7 +111,7 @@ def make_comparison(tmp_path: Path) -> MakeComparison:
         (folder / "comparison.json").write_text(json.dumps(document))
         states = {row["sample_id"]: row["state"] for row in dataset.rows}
         for fold, roles in enumerate(read_splits(folder / "splits.csv")):
-            tested = [name for name, role in roles.items() if role == "test" and states[name] != NO_DOOR]
+            tested = [name for name, role in roles.items() if role == "test" and states[name] in STATES]
             for network in networks:
                 if (network, fold) not in missing:
                     predicted = {sample_id: states[sample_id] for sample_id in tested}

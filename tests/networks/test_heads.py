@@ -36,6 +36,7 @@ ROW = {
     "opening_width_m": "0.9",
     "passable_width_m": "0.6",
 }
+UNKNOWN_STATE = ROW | {"state": "unknown", "opening_angle_deg": "", "hinge": "", "passable_width_m": "0.0"}
 WITHOUT_DOOR = {"sample_id": "a", "state": "no_door"}
 
 
@@ -64,6 +65,15 @@ def test_targets_are_in_the_units_of_the_normalised_cloud() -> None:
     assert targets.pop("door").tolist() == [[1], [0]]
     assert all(np.isnan(values[1]).all() for values in targets.values())
     assert all(values.dtype == np.float32 for values in targets.values())
+
+
+def test_a_door_of_unknown_state_has_a_place_but_neither_angle_nor_hinge() -> None:
+    targets = head_targets([ROW, UNKNOWN_STATE], at_origin(2))
+    assert targets["door"][:, 0].tolist() == [1, 1]
+    assert np.isnan(targets["angle"][1]).all()
+    assert np.isnan(targets["hinge"][1]).all()
+    assert_allclose(targets["frame"][1], targets["frame"][0])
+    assert targets["widths"][1] * SCALE_M == pytest.approx([0.9, 0.0])
 
 
 def test_only_the_named_heads_have_targets() -> None:

@@ -95,18 +95,17 @@ def prepare(
 def print_summary(summary: PreparationSummary, out: Path) -> None:
     """Print the number of prepared clouds; exit with code 1 if clouds were rejected."""
     from doorstate.cli.console import stderr, stdout
-    from doorstate.types import NO_DOOR, STATES
+    from doorstate.types import LABELS, STATES
 
     for row in summary.rejected[:_MAX_LISTED]:
         stderr.print(f"rejected {row['file'] or row['sample_id']}: {row['reason']}")
     if summary.rejected:
         stderr.print(f"{len(summary.rejected)} clouds rejected; all are listed in {out / 'rejected.csv'}")
-    names = (*STATES, NO_DOOR)
-    counts = {name: int((summary.dataset.labels == label).sum()) for label, name in enumerate(names)}
+    counts = {name: int((summary.dataset.labels == label).sum()) for label, name in enumerate(LABELS)}
     for state in STATES:
         if not counts[state] and summary.dataset.description.kind == "imported":
             stderr.print(f"no clouds of state {state}: check the name of its folder")
-    by_state = ", ".join(f"{count} {name}" for name, count in counts.items() if count or name != NO_DOOR)
+    by_state = ", ".join(f"{count} {name}" for name, count in counts.items() if count or name in STATES)
     stdout.print(
         f"{len(summary.dataset)} clouds of {summary.dataset.num_points} points in {out} ({by_state})"
     )

@@ -21,7 +21,7 @@ from doorstate.clouds.normalization import Placement
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import ConfigError
 from doorstate.networks.heads import IGNORE_INDEX, POINT_HEADS, augment_targets, head_targets
-from doorstate.types import DOOR, PARTS, STATES
+from doorstate.types import DOOR, LABELS, NO_DOOR, PARTS, STATES
 
 FindNeighbours = Callable[[Tensor], tuple[Tensor, ...]]
 """From (B, n, 3) points to (B, ...) int64 indices into them."""
@@ -37,24 +37,25 @@ class Batch(NamedTuple):
 
 
 def check_states(dataset: PreparedDataset, sample_ids: Sequence[str], heads: Sequence[str]) -> None:
-    """Raise ConfigError if samples show no door and no head predicts the presence of a door."""
+    """Raise ConfigError if samples have no state and no head predicts the presence of a door."""
     if DOOR in heads:
         return
     without = [sample for sample in sample_ids if dataset.labels[dataset.index_of(sample)] >= len(STATES)]
     if without:
         raise ConfigError(
-            f"{len(without)} samples show no door, such as {without[0]}",
+            f"{len(without)} samples show no door, or one of unknown state, such as {without[0]}",
             path=dataset.folder,
             hint=f"leave them out, or add the head {DOOR!r}",
         )
 
 
 class _Loaded(NamedTuple):
-    """Points (M, n, 3), their placement, labels (M,), targets by head, and parts of M samples."""
+    """Points (M, n, 3), their placement, labels (M,), doors, targets by head, and parts of M samples."""
 
     points: np.ndarray
     placement: Placement
     labels: np.ndarray
+    has_door: np.ndarray  # (M,) bool
     targets: dict[str, np.ndarray]
     parts: np.ndarray | None  # (M, n)
 
@@ -79,12 +80,12 @@ class CloudLoader:
             num_points: points of each cloud.
             find_neighbours: search that runs once per cloud, before augmentation; only for augmentations that do not
                 change its result.
-            heads: names of the heads that need targets; with "door" among them, samples without a door are allowed
-                and labelled `IGNORE_INDEX`.
+            heads: names of the heads that need targets; with "door" among them, samples without a door, and doors of
+                unknown state, are allowed and labelled `IGNORE_INDEX`.
             extra_datasets: data sets to append as a whole.
 
         Raises:
-            ConfigError: a data set has fewer points, samples show no door, or the parts of points are not stored.
+            ConfigError: a data set has fewer points, samples have no state, or the parts of points are not stored.
         """
         selected = [(dataset, list(sample_ids)), *((extra, extra.sample_ids) for extra in extra_datasets)]
         self.sample_ids = [sample for _, samples in selected for sample in samples]
@@ -94,6 +95,7 @@ class CloudLoader:
         centres = _concatenate([samples.placement.centres for samples in loaded])
         self.placement = Placement(centres, self._normalization.scale_m)
         self._labels = _concatenate([samples.labels for samples in loaded])
+        self._has_door = _concatenate([samples.has_door for samples in loaded])
         self._targets = {
             name: _concatenate([samples.targets[name] for samples in loaded]) for name in loaded[0].targets
         }
@@ -143,8 +145,7 @@ class CloudLoader:
 
     def _draw(self, rng: np.random.Generator, count: int, no_door_share: float) -> np.ndarray:
         """Return the numbers of `count` samples in random order, with a share of those without a door."""
-        has_door = self._labels != IGNORE_INDEX
-        groups = [np.flatnonzero(~has_door), np.flatnonzero(has_door)]
+        groups = [np.flatnonzero(~self._has_door), np.flatnonzero(self._has_door)]
         without = round(no_door_share * count) if len(groups[0]) else 0
         drawn = [
             np.resize(np.concatenate([rng.permutation(group) for _ in range(1 + size // len(group))]), size)
@@ -184,11 +185,13 @@ def _load(
     # A prefix of a farthest-point order is the farthest-point sample of that size.
     points = dataset.clouds[indices, :num_points]
     check_states(dataset, sample_ids, heads)
-    labels = np.where(dataset.labels[indices] < len(STATES), dataset.labels[indices], IGNORE_INDEX)
+    stored = dataset.labels[indices]
+    labels = np.where(stored < len(STATES), stored, IGNORE_INDEX)
     placement = dataset.normalization.placement(points)
     targets = head_targets([dataset.rows[index] for index in indices], placement, heads)
     parts = dataset.parts_of(indices, num_points) if PARTS in heads else None
-    return _Loaded(dataset.normalization(points), placement, labels, targets, parts)
+    has_door = stored != LABELS.index(NO_DOOR)
+    return _Loaded(dataset.normalization(points), placement, labels, has_door, targets, parts)
 
 
 class _NeighbourCache:

@@ -27,10 +27,9 @@ from doorstate.errors import ConfigError, DatasetError, first_validation_error
 from doorstate.simulation.frames import Frame, replay
 from doorstate.simulation.manifest import MANIFEST_FILE, unflatten
 from doorstate.simulation.shading import shade
-from doorstate.types import NO_DOOR, STATES, Indices, Points
+from doorstate.types import LABELS, Indices, Points
 
 CLOUDS_FILE, PARTS_FILE = "clouds.npy", "parts.npy"
-_LABELS = (*STATES, NO_DOOR)
 _CACHED_CLOUDS = 512
 _CACHED_IMAGES = 64  # a megabyte each
 _T = TypeVar("_T")
@@ -93,8 +92,8 @@ class PreparedDataset:
 
     @cached_property
     def labels(self) -> NDArray[np.int64]:
-        """Class labels (M,), `DoorState.class_index`; 3 for a scene without a door."""
-        return np.array([_LABELS.index(row["state"]) for row in self.rows], dtype=np.int64)
+        """Positions (M,) in `LABELS`: `DoorState.class_index`, 3 without a door, 4 for a door of unknown state."""
+        return np.array([LABELS.index(row["state"]) for row in self.rows], dtype=np.int64)
 
     @property
     def sample_ids(self) -> list[str]:
@@ -270,8 +269,8 @@ def _check(
     name, count = Counter(row["sample_id"] for row in rows).most_common(1)[0] if rows else ("", 0)
     if count > 1:
         raise DatasetError(f"{count} samples are named {name!r}", path=manifest, field="sample_id")
-    unknown = sorted({row["state"] for row in rows} - set(_LABELS))
+    unknown = sorted({row["state"] for row in rows} - set(LABELS))
     if unknown:
         raise DatasetError(
-            f"no state {unknown[0]!r}", path=manifest, field="state", expected=f"one of {', '.join(_LABELS)}"
+            f"no state {unknown[0]!r}", path=manifest, field="state", expected=f"one of {', '.join(LABELS)}"
         )

@@ -11,7 +11,7 @@ import pandas as pd
 from doorstate.evaluation.metrics import Floats, label_codes, mean_and_deviation, ratio
 from doorstate.evaluation.results import PROBABILITY_COLUMNS, Results
 from doorstate.training.calibration import at_temperature, fit_temperature
-from doorstate.types import NO_DOOR, STATES, Indices
+from doorstate.types import STATES, Indices
 
 BINS = 15
 
@@ -58,7 +58,7 @@ class Calibration(NamedTuple):
 
 
 def labels_and_probabilities(predictions: pd.DataFrame) -> tuple[Indices, Floats]:
-    """Return (N,) true labels and (N, 3) probabilities of rows with a door."""
+    """Return (N,) true labels and (N, 3) probabilities of rows with a state."""
     labels = label_codes(predictions["state"], STATES)
     return labels, predictions[list(PROBABILITY_COLUMNS)].to_numpy(dtype=np.float64)
 
@@ -70,7 +70,7 @@ def calibrate(results: Results, method: str) -> Calibration | None:
         None if a fold has no validation predictions.
     """
     rows = results.predictions[
-        (results.predictions["method"] == method) & (results.predictions["state"] != NO_DOOR)
+        (results.predictions["method"] == method) & results.predictions["state"].isin(STATES)
     ]
     true, raw, scaled, temperatures = [], [], [], []
     for run in results.runs_of(method):

@@ -13,7 +13,7 @@ import pandas as pd
 from doorstate.dataset.roles import Role
 from doorstate.errors import RunError
 from doorstate.evaluation.results import PROBABILITY_COLUMNS, Results
-from doorstate.types import NO_DOOR, PREDICTED_LABELS, STATES
+from doorstate.types import LABELS, PREDICTED_LABELS, STATES
 
 _AGAIN = "test this run again"
 
@@ -57,9 +57,12 @@ def check_predictions(results: Results, path_of: Callable[[str, int], Path]) -> 
 
 
 def _check_labels(run: pd.DataFrame, path: Path, *, is_rule: bool) -> None:
-    door = run["state"] != NO_DOOR
-    for column, labels in (("state", STATES), ("predicted", PREDICTED_LABELS)):
-        unknown = run.loc[door & ~run[column].isin(labels), column]
+    has_state = run["state"].isin(STATES)
+    for column, labels, checked in (
+        ("state", LABELS, ~has_state),
+        ("predicted", PREDICTED_LABELS, has_state),
+    ):
+        unknown = run.loc[checked & ~run[column].isin(labels), column]
         if len(unknown):
             raise RunError(
                 f"unknown label {unknown.iloc[0]!r}",
@@ -68,7 +71,7 @@ def _check_labels(run: pd.DataFrame, path: Path, *, is_rule: bool) -> None:
                 expected=f"one of {', '.join(labels)}",
                 hint=_AGAIN,
             )
-    if not is_rule and not np.isfinite(run.loc[door, list(PROBABILITY_COLUMNS)].to_numpy()).all():
+    if not is_rule and not np.isfinite(run.loc[has_state, list(PROBABILITY_COLUMNS)].to_numpy()).all():
         raise RunError("a probability is not finite", path=path, hint=_AGAIN)
 
 
@@ -101,7 +104,7 @@ def _check_states(run: pd.DataFrame, states: pd.Series[str], path: Path) -> None
 def _check_count(run: pd.DataFrame, results: Results, fold: int, path: Path) -> None:
     roles = pd.Series(results.splits[fold], dtype="str")
     states = roles.index.to_series().map(results.manifest["state"])
-    expected = int(((roles == "test") & (states != NO_DOOR)).sum())
-    count = int(((run["role"] == "test") & (run["state"] != NO_DOOR)).sum())
+    expected = int(((roles == "test") & states.isin(STATES)).sum())
+    count = int(((run["role"] == "test") & run["state"].isin(STATES)).sum())
     if count != expected:
         raise RunError(f"{count} of {expected} test samples of fold {fold}", path=path, hint=_AGAIN)

@@ -19,7 +19,7 @@ from doorstate.evaluation.results import TEXT_COLUMNS, join_manifest
 from doorstate.inference.abstention import Abstention
 from doorstate.inference.prediction import Prediction
 from doorstate.inference.predictor import Predictor
-from doorstate.types import ABSTAINED, STATES
+from doorstate.types import ABSTAINED, STATES, UNKNOWN_STATE
 
 _NO_PROBABILITIES = dict.fromkeys(STATES, math.nan)  # of a rule, and of a cloud that was not evaluated
 Predictors = Mapping[str, Predictor]
@@ -60,14 +60,15 @@ class FrameResults:
     def joined(self) -> pd.DataFrame:
         """Predictions joined with the columns of the index, as `Results.joined` is with a manifest.
 
-        On a frame without a clear door an abstention is `correct`.
+        On a frame without a clear door an abstention is `correct`; on one of unknown state every answer is.
         """
         index = pd.DataFrame(
             [{**frame.columns, "sample_id": frame.file, "state": ""} for frame in self.frames]
         )
         joined = join_manifest(self.predictions, index.astype("str").set_index("sample_id", drop=False))
         is_door = joined["state"].isin(STATES)
-        return joined.assign(correct=joined["correct"].where(is_door, joined["predicted"] == ABSTAINED))
+        may_abstain = (joined["predicted"] == ABSTAINED) | (joined["state"] == UNKNOWN_STATE)
+        return joined.assign(correct=joined["correct"].where(is_door, may_abstain))
 
     def misclassified_by(self, number: int) -> list[str]:
         """Return the methods that misclassified a frame, or predicted a state where there is no clear door."""

@@ -16,7 +16,7 @@ from doorstate.networks.card import HeadErrors
 from doorstate.networks.door_calibration import DoorCalibration
 from doorstate.networks.heads import HEADS, POINT_HEADS, head_metrics
 from doorstate.training.calibration import fit_door_calibration
-from doorstate.types import DECISION_THRESHOLD, NO_DOOR, PARTS, STATES
+from doorstate.types import DECISION_THRESHOLD, NO_DOOR, PARTS, STATES, UNKNOWN_STATE
 
 PART_NAMES = POINT_HEADS[PARTS].classes
 
@@ -125,11 +125,14 @@ def score_presence(results: Results) -> pd.DataFrame:
 def score_four_labels(results: Results) -> pd.DataFrame:
     """Score predictors that name a state or no door; a state counts as predicted if a door is likelier than none.
 
+    Doors of unknown state are left out.
+
     Returns:
         Columns method, samples, recall of each state and of `no_door`, their mean, and accuracy.
     """
     rows = []
     for method, outputs in _with_presence(results):
+        outputs = outputs[outputs["state"] != UNKNOWN_STATE]
         door = outputs["p_door"] >= DECISION_THRESHOLD
         correct = (door & outputs["correct"]).where(outputs["state"] != NO_DOOR, ~door)
         recall = {state: correct[outputs["state"] == state].mean() for state in (*STATES, NO_DOOR)}

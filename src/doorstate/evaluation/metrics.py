@@ -23,7 +23,7 @@ def confusion(predictions: pd.DataFrame) -> Indices:
     """Count samples by true state and predicted label.
 
     Args:
-        predictions: columns `state` and `predicted`; rows of samples without a door are left out.
+        predictions: columns `state` and `predicted`; rows of samples without a state are left out.
 
     Returns:
         (3, 4) counts in the order of `STATES` and `PREDICTED_LABELS`.
@@ -34,7 +34,7 @@ def confusion(predictions: pd.DataFrame) -> Indices:
 
 
 def confusion_cells(predictions: pd.DataFrame) -> Indices:
-    """Return for each row its cell of a flattened (3, 4) confusion matrix, -1 for a sample without a door."""
+    """Return for each row its cell of a flattened (3, 4) confusion matrix, -1 for a sample without a state."""
     state = label_codes(predictions["state"], STATES)
     predicted = label_codes(predictions["predicted"], PREDICTED_LABELS)
     return np.where((state >= 0) & (predicted >= 0), state * len(PREDICTED_LABELS) + predicted, -1)

@@ -16,7 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from doorstate._models import Name
 from doorstate.dataset.roles import Role
 from doorstate.rules.base import Detection
-from doorstate.types import NO_DOOR, STATES
+from doorstate.types import STATES
 
 PROBABILITY_COLUMNS = tuple(f"p_{state}" for state in STATES)
 TEXT_COLUMNS = ("part", "method", "role", "sample_id", "state", "predicted", "reason", "open_or_not")
@@ -67,9 +67,9 @@ class RunRecord:
 class Results:
     """Finished runs of a comparison, in the order of its methods and folds.
 
-    `predictions` has one row for each method, fold, role (test, val) and sample. A sample without a door has a row
-    where a network has further heads; its `predicted` and its probabilities of states are missing. So are the
-    probabilities of rules.
+    `predictions` has one row for each method, fold, role (test, val) and sample. A sample without a door, or with a
+    door of unknown state, has a row where a network has further heads; its `predicted` and its probabilities of states
+    are missing. So are the probabilities of rules.
     """
 
     config: ComparisonConfig
@@ -122,8 +122,8 @@ class Results:
 
     @cached_property
     def tested(self) -> pd.DataFrame:
-        """Rows of `joined` with a door that were tested; pooled over folds, every sample at most once a method."""
-        return self.joined[(self.joined["role"] == "test") & (self.joined["state"] != NO_DOOR)]
+        """Rows of `joined` with a state that were tested; pooled over folds, every sample at most once a method."""
+        return self.joined[(self.joined["role"] == "test") & self.joined["state"].isin(STATES)]
 
     def tested_by(self, method: str) -> pd.DataFrame:
         """Return the rows of `tested` of a method."""

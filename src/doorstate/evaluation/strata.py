@@ -11,7 +11,7 @@ from doorstate.dataset.strata import BANDS, REGIONS
 from doorstate.evaluation.manifest import text_values
 from doorstate.evaluation.metrics import confusion_cells, label_codes, precision_recall_f1
 from doorstate.evaluation.results import Results
-from doorstate.types import NO_DOOR, PREDICTED_LABELS, STATES, Indices
+from doorstate.types import LABELS, PREDICTED_LABELS, STATES, Indices
 
 ALL = "all"
 STRATUM_BANDS, STRATUM_REGIONS = (*BANDS, ALL), (*REGIONS, ALL)
@@ -29,7 +29,8 @@ def count_samples(manifest: pd.DataFrame) -> pd.DataFrame:
     Returns:
         Columns state, region, one a band, all.
     """
-    states = [*STATES, *([NO_DOOR] if (manifest["state"] == NO_DOOR).any() else [])]
+    present = set(manifest["state"])
+    states = [label for label in LABELS if label in STATES or label in present]
     codes = label_codes(manifest["state"], states)
     grid = _with_sums(_count(manifest, codes, len(states)))
     grid = np.concatenate([grid, grid.sum(axis=-1, keepdims=True)], axis=-1)  # (6, 5, states + 1)

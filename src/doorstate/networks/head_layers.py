@@ -103,7 +103,7 @@ def joint_losses(
     Args:
         network: any network.
         points: (B, N, 3) as in `PointNetwork.forward`.
-        labels: (B,) int64 states, -100 without a door.
+        labels: (B,) int64 states, -100 for none.
         targets: targets by head.
         label_smoothing: as in `PointNetwork.training_loss`, for the state.
         neighbourhoods: as in `PointNetwork.forward`.
@@ -115,12 +115,12 @@ def joint_losses(
     """
     network.check_points(points)
     encoding = network.encode(points, neighbourhoods)
-    # The mean over no doors would be NaN. Without a branch, because a branch would wait for the device.
-    has_door = (labels >= 0).any()
+    # The mean over no states would be NaN. Without a branch, because a branch would wait for the device.
+    has_state = (labels >= 0).any()
     loss, logits = network.loss_from_encoding(
-        encoding, labels.where(has_door, torch.zeros_like(labels)), label_smoothing
+        encoding, labels.where(has_state, torch.zeros_like(labels)), label_smoothing
     )
-    losses = {STATE: loss * has_door}
+    losses = {STATE: loss * has_state}
     for name, head in network.heads.items():
         target = targets[name]
         if isinstance(head, Head):

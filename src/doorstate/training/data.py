@@ -10,7 +10,7 @@ from doorstate.dataset.loader import CloudLoader, FindNeighbours
 from doorstate.dataset.roles import Role
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import DatasetError
-from doorstate.types import NO_DOOR
+from doorstate.types import STATES
 
 _ROLES: tuple[Role, ...] = ("train", "val", "test")
 _MIN_SAMPLES = 2  # of each role
@@ -42,7 +42,7 @@ class RunData:
             extra_datasets: data sets of which all samples are trained on.
 
         Raises:
-            DatasetError: a role has too few samples, or none with a door.
+            DatasetError: a role has too few samples, or none with a state.
         """
         self.dataset, self.heads, self.extra_datasets = dataset, heads, extra_datasets
         self.samples: dict[Role, list[str]] = {
@@ -96,7 +96,8 @@ class RunData:
                     f"{len(samples)} samples for {role}: the data set is too small for this split",
                     path=folder,
                 )
-            if all(self.dataset.rows[self.dataset.index_of(name)]["state"] == NO_DOOR for name in samples):
+            if all(self.dataset.rows[self.dataset.index_of(name)]["state"] not in STATES for name in samples):
                 raise DatasetError(
-                    f"no sample with a door for {role}: the data set is too small for this split", path=folder
+                    f"no sample with a state of a door for {role}: the data set is too small for this split",
+                    path=folder,
                 )

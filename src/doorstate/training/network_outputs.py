@@ -27,13 +27,13 @@ class NetworkOutputs(NamedTuple):
 
     loss: float  # mean cross entropy of the states
     probabilities: np.ndarray  # (M, 3)
-    labels: np.ndarray  # (M,) int64, IGNORE_INDEX for a scene without a door
+    labels: np.ndarray  # (M,) int64, IGNORE_INDEX without a state
     head_values: dict[str, np.ndarray]  # by head, (M, num_values), in the network's units
     part_counts: np.ndarray | None  # (parts, parts) points by true and predicted part
 
     @property
     def has_state(self) -> np.ndarray:
-        """(M,) True where the sample shows a door."""
+        """(M,) True where the sample has a state."""
         mask: np.ndarray = self.labels != IGNORE_INDEX
         return mask
 

@@ -25,7 +25,7 @@ from doorstate.rules import create_rule
 from doorstate.rules.base import RuleResult
 from doorstate.training.contents import contents_of_run, keep_contents
 from doorstate.training.run_folder import RunFolder
-from doorstate.types import ABSTAINED, NO_DOOR, STATES
+from doorstate.types import ABSTAINED, STATES
 
 _POSITION_INTERVAL_S = 1.0
 _OPEN_OR_NOT = ("not_open", "open")
@@ -44,7 +44,7 @@ class RuleRunConfig(FrozenModel):
 def run_rule(
     config: RuleRunConfig, dataset: PreparedDataset, roles: Mapping[str, Role], folder: Path
 ) -> dict[str, Any]:
-    """Apply a rule to the raw clouds of the test samples with a door; a finished run is returned.
+    """Apply a rule to the raw clouds of the test samples with a state; a finished run is returned.
 
     Predictions have more columns than those of a network: reason, opening_angle_deg, opening_width_m, open_or_not.
     Detections in the samples that the rule got wrong are kept in `detections.jsonl`, for the report.
@@ -59,7 +59,7 @@ def run_rule(
         Metrics as in `metrics.json`.
 
     Raises:
-        DatasetError: there is no test sample with a door.
+        DatasetError: there is no test sample with a state.
         RunError: the folder holds another run, or began with other data.
         FolderInUseError: another process works in the folder.
     """
@@ -76,7 +76,9 @@ def _apply(
         return run.read_metrics()
     samples = _test_samples(dataset, roles)
     if not samples:
-        raise DatasetError(f"no test sample with a door in fold {config.fold}", path=dataset.folder)
+        raise DatasetError(
+            f"no test sample with a state of a door in fold {config.fold}", path=dataset.folder
+        )
     rule = create_rule(config.rule)
     started = position_s = time.perf_counter()
     rows, detections, milliseconds = [], [], []
@@ -113,7 +115,7 @@ def _test_samples(dataset: PreparedDataset, roles: Mapping[str, Role]) -> list[s
     return [
         sample
         for sample, role in roles.items()
-        if role == "test" and dataset.rows[dataset.index_of(sample)]["state"] != NO_DOOR
+        if role == "test" and dataset.rows[dataset.index_of(sample)]["state"] in STATES
     ]
 
 

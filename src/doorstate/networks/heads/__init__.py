@@ -45,7 +45,7 @@ POINT_HEADS = {head.name: head for head in (PARTS_HEAD,)}
 STATE = "state"
 """Name of the output of the network's own classification head."""
 IGNORE_INDEX = -100
-"""Label of a cloud without a door; torch's cross entropy skips it."""
+"""Label of a cloud without a door, or of a door of unknown state; torch's cross entropy skips it."""
 
 
 def head_targets(
