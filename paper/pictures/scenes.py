@@ -4,17 +4,20 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from io import BytesIO
 
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
+from doorstate.io.camera import Intrinsics
+from doorstate.simulation.camera import CameraPose
 from doorstate.simulation.frames import Frame
 from doorstate.simulation.generate import simulate_rows
 from doorstate.simulation.presets import PRESETS
-from doorstate.simulation.render import is_made_of, render
+from doorstate.simulation.render import Render, is_made_of, render
 from doorstate.simulation.row import Row
+from doorstate.simulation.scene.box import Box, Material
 from doorstate.simulation.shading import shade
 from doorstate.simulation.truth import true_doors
 from doorstate.types import STATES
@@ -31,17 +34,27 @@ KINDS: Mapping[str, Callable[[Row], str]] = {
 SCENES = 100  # enough for every kind
 COLUMNS = 6
 WIDTH, HEIGHT, GAP, HEADING = 213, 160, 5, 26
-GLASS = np.array([150, 205, 225])
+TINTS: Mapping[Material, tuple[tuple[int, int, int], float]] = {
+    "glass": ((150, 205, 225), 0.4),
+    "gloss": ((170, 178, 186), 0.8),
+}
+"""Colour of a material, and its share in a picture."""
 
 
 def picture(row: Row, frame: Frame) -> Image.Image:
-    """Return a shaded sample with tinted glass."""
-    intrinsics, boxes = row.camera.intrinsics(), row.boxes()
-    shaded = shade(frame.full, intrinsics).astype(np.float64)
-    rendered = render(boxes, row.camera_pose(), intrinsics)
-    glass = is_made_of("glass", rendered, boxes)
-    shaded[glass] = 0.6 * shaded[glass] + 0.4 * GLASS
-    return Image.fromarray(shaded.astype(np.uint8)).resize((WIDTH, HEIGHT), Image.Resampling.LANCZOS)
+    """Return a shaded sample with tinted glass and metal."""
+    image = shaded(frame.full, row.boxes(), row.camera_pose(), row.camera.intrinsics())
+    return image.resize((WIDTH, HEIGHT), Image.Resampling.LANCZOS)
+
+
+def shaded(full: Render, boxes: Sequence[Box], pose: CameraPose, intrinsics: Intrinsics) -> Image.Image:
+    """Return a shaded rendering of what is behind glass, with tinted glass and metal."""
+    pixels = shade(full, intrinsics).astype(np.float64)
+    rendered = render(boxes, pose, intrinsics)
+    for material, (tint, share) in TINTS.items():
+        made_of = is_made_of(material, rendered, boxes)
+        pixels[made_of] = (1 - share) * pixels[made_of] + share * np.array(tint)
+    return Image.fromarray(pixels.astype(np.uint8))
 
 
 def lines(preset: str) -> dict[str, list[Image.Image]]:
