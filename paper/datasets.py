@@ -77,6 +77,10 @@ SIMULATED = {
     "test-ogurob": "--preset ogurob --poses 200 --seed 31",
     "test-angles": "--preset varied-angles --scenes 200 --seed 22 --sensor xtion",
     "test-cluttered": "--preset cluttered --scenes 300 --seed 23 --sensor xtion",
+    # The same frames cropped at their best doorway; no doorways of DeepDoors2's camera are trained on.
+    "test-xtion-doorways": "--preset varied --scenes 100 --seed 21 --sensor xtion",
+    "test-deepdoors2-doorways": "--preset varied --scenes 100 --seed 21 --sensor deepdoors2",
+    "test-cluttered-doorways": "--preset cluttered --scenes 300 --seed 23 --sensor xtion",
 }
 # Every camera sees doors and bare walls: the noise of a camera must not tell them apart.
 _MIXED = (

@@ -17,6 +17,16 @@ class FrozenModel(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
+def _check_order(values: tuple[float, float]) -> tuple[float, float]:
+    if values[0] > values[1]:
+        raise ValueError("the first of the two is the smaller one")
+    return values
+
+
+Ordered = AfterValidator(_check_order)
+"""Validator of a range: its first value is not the larger one."""
+
+
 def _check_name(name: str) -> str:
     is_plain = name.isprintable() and not any(character in name for character in _FORBIDDEN)
     if not is_plain or not 0 < len(name) <= MAX_NAME_LENGTH or name.startswith(".") or name != name.strip():

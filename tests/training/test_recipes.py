@@ -56,3 +56,16 @@ def test_label_smoothing_of_dgcnn_is_that_of_the_authors() -> None:
     assert 1 - smoothing + smoothing / 3 == pytest.approx(0.8)
     assert smoothing / 3 == pytest.approx(0.1)
     assert AUTHORS["pointnet"].label_smoothing == 0.0
+
+
+def test_corruption_is_off_and_then_not_stored_so_that_earlier_runs_go_on() -> None:
+    assert Recipe(name="plain").corruption.changes_nothing
+    assert "corruption" not in Recipe(name="plain").model_dump()
+    changed = Recipe.model_validate(
+        {
+            "name": "corrupted",
+            "corruption": {"cut_outs": 2, "cut_sides_m": [0.1, 0.4], "holes": 0.25, "mix": 0.2},
+        }
+    )
+    assert changed.corruption.cut_sides_m == (0.1, 0.4)
+    assert Recipe.model_validate_json(changed.model_dump_json()) == changed

@@ -10,6 +10,7 @@ import torch
 
 from doorstate._files import read_csv
 from doorstate.clouds.augmentation import Augmentation
+from doorstate.clouds.corruption import Corruption
 from doorstate.dataset.loader import Batch
 from doorstate.dataset.roles import Role
 from doorstate.dataset.store import PreparedDataset
@@ -167,6 +168,14 @@ def test_neighbours_searched_once_train_the_same_network(
     ]
     for name, value in weights[0].items():
         assert torch.equal(value, weights[1][name]), name
+
+
+@pytest.mark.parametrize(("losses", "fixed"), [({}, True), ({"holes": 0.1}, False)])
+def test_corruption_changes_neighbours(losses: dict[str, float], fixed: bool) -> None:
+    trainer = Trainer.__new__(Trainer)
+    recipe = RECIPE.model_copy(update={"augmentation": Augmentation(), "corruption": Corruption(**losses)})
+    trainer.config, trainer.network = run_config(recipe=recipe), PointNet2()
+    assert trainer.neighbours_are_fixed is fixed
 
 
 def test_head_of_loss_weight_0_is_not_trained(

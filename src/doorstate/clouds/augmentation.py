@@ -12,20 +12,13 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, Field
+from pydantic import Field
 
-from doorstate._models import FrozenModel
+from doorstate._models import FrozenModel, Ordered
 from doorstate.types import Points
 
-
-def _check_order(values: tuple[float, float]) -> tuple[float, float]:
-    if values[0] > values[1]:
-        raise ValueError("the first of the two is the smaller one")
-    return values
-
-
 _Scale = Annotated[float, Field(ge=0.01, le=100)]
-_Range = Annotated[tuple[_Scale, _Scale], AfterValidator(_check_order)]
+_Range = Annotated[tuple[_Scale, _Scale], Ordered]
 
 
 class Augmentation(FrozenModel):

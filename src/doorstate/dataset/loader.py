@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from doorstate.clouds.augmentation import (
@@ -17,12 +18,15 @@ from doorstate.clouds.augmentation import (
     apply_augmentation,
     draw_augmentation,
 )
+from doorstate.clouds.corruption import Corruption, CorruptionDraw
 from doorstate.clouds.normalization import Placement
+from doorstate.dataset.corruptor import Corruptor, Openings
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import ConfigError
 from doorstate.networks.heads import IGNORE_INDEX, POINT_HEADS, augment_targets, head_targets
 from doorstate.types import DOOR, LABELS, NO_DOOR, PARTS, STATES
 
+MOST_STORED = 2  # points that are held for each point of a corrupted cloud, if a data set stores as many
 FindNeighbours = Callable[[Tensor], tuple[Tensor, ...]]
 """From (B, n, 3) points to (B, ...) int64 indices into them."""
 
@@ -50,14 +54,14 @@ def check_states(dataset: PreparedDataset, sample_ids: Sequence[str], heads: Seq
 
 
 class _Loaded(NamedTuple):
-    """Points (M, n, 3), their placement, labels (M,), doors, targets by head, and parts of M samples."""
+    """Points (M, S, 3), their placement, labels (M,), doors, targets by head, and parts of M samples."""
 
     points: np.ndarray
     placement: Placement
     labels: np.ndarray
     has_door: np.ndarray  # (M,) bool
     targets: dict[str, np.ndarray]
-    parts: np.ndarray | None  # (M, n)
+    parts: np.ndarray | None  # (M, S)
 
 
 class CloudLoader:
@@ -71,6 +75,7 @@ class CloudLoader:
         find_neighbours: FindNeighbours | None = None,
         heads: Sequence[str] = (),
         extra_datasets: Sequence[PreparedDataset] = (),
+        corruption: Corruption | None = None,
     ) -> None:
         """Load clouds.
 
@@ -83,13 +88,25 @@ class CloudLoader:
             heads: names of the heads that need targets; with "door" among them, samples without a door, and doors of
                 unknown state, are allowed and labelled `IGNORE_INDEX`.
             extra_datasets: data sets to append as a whole.
+            corruption: random losses of shuffled crops, which change neighbours. Lost points are replaced by later
+                ones where the data sets store more than `num_points`; the rest is repeated.
 
         Raises:
-            ConfigError: a data set has fewer points, samples have no state, or the parts of points are not stored.
+            ConfigError: a data set has fewer points, samples have no state, the parts of points are not stored, or
+                whole clouds, whose centres depend on all points, are to be corrupted.
         """
         selected = [(dataset, list(sample_ids)), *((extra, extra.sample_ids) for extra in extra_datasets)]
         self.sample_ids = [sample for _, samples in selected for sample in samples]
-        loaded = [_load(source, samples, num_points, heads) for source, samples in selected]
+        corruption = None if corruption is None or corruption.changes_nothing else corruption
+        if corruption is not None and dataset.normalization.centre_m is None:
+            raise ConfigError("holds no crops to corrupt", path=dataset.folder, field="corruption")
+        stored = num_points
+        if corruption is not None:
+            least = min(source.num_points for source, _ in selected)
+            stored = max(num_points, min(MOST_STORED * num_points, least))
+        with_parts = PARTS in heads or (corruption is not None and corruption.mix > 0)
+        loaded = [_load(source, samples, stored, heads, with_parts) for source, samples in selected]
+        self._num_points = num_points
         self._points = _concatenate([samples.points for samples in loaded])
         self._normalization = dataset.normalization
         centres = _concatenate([samples.placement.centres for samples in loaded])
@@ -101,7 +118,21 @@ class CloudLoader:
         }
         parts = [samples.parts for samples in loaded if samples.parts is not None]
         self._parts = _concatenate(parts) if parts else None
+        self._has_part_targets = PARTS in heads
         self._neighbours = None if find_neighbours is None else _NeighbourCache(find_neighbours, self._points)
+        self._corruptor = None
+        if corruption is not None:
+            rows = [
+                source.rows[source.index_of(sample)] for source, samples in selected for sample in samples
+            ]
+            self._corruptor = Corruptor(
+                corruption,
+                self._points,
+                self._parts,
+                _openings(rows, self.placement, self._has_door),
+                self._has_door,
+                self._normalization.scale_m,
+            )
 
     def __len__(self) -> int:
         return len(self._labels)
@@ -109,7 +140,7 @@ class CloudLoader:
     def in_order(self, batch_size: int) -> Iterator[Batch]:
         """Yield every sample once, in order and without augmentation."""
         for start in range(0, len(self), batch_size):
-            yield self._batch(np.arange(start, min(start + batch_size, len(self))), None)
+            yield self._batch(np.arange(start, min(start + batch_size, len(self))))
 
     def shuffled(
         self,
@@ -120,7 +151,7 @@ class CloudLoader:
         limit: int | None = None,
         no_door_share: float | None = None,
     ) -> Iterator[Batch]:
-        """Yield one training epoch, shuffled and augmented, without an incomplete last batch.
+        """Yield one training epoch, shuffled, corrupted and augmented, without an incomplete last batch.
 
         Args:
             batch_size: clouds of a batch; at most the clouds of the epoch.
@@ -137,11 +168,12 @@ class CloudLoader:
         else:
             order = self._draw(rng, min(len(self), limit or len(self)), no_door_share)
         batch_size = min(batch_size, len(order))
-        num_points = self._points.shape[1]
+        across = self._normalization.across
         for number, start in enumerate(range(0, len(order) - batch_size + 1, batch_size)):
-            draw = draw_augmentation(augmentation, rng, batch_size, num_points, self._normalization.across)
+            draw = draw_augmentation(augmentation, rng, batch_size, self._num_points, across)
+            losses = None if self._corruptor is None else self._corruptor.draw(rng, batch_size)
             if number >= skip:
-                yield self._batch(order[start : start + batch_size], draw)
+                yield self._batch(order[start : start + batch_size], draw, losses)
 
     def _draw(self, rng: np.random.Generator, count: int, no_door_share: float) -> np.ndarray:
         """Return the numbers of `count` samples in random order, with a share of those without a door."""
@@ -154,15 +186,21 @@ class CloudLoader:
         ]
         return rng.permutation(np.concatenate(drawn))
 
-    def _batch(self, indices: np.ndarray, draw: AugmentationDraw | None) -> Batch:
-        points = self._points[indices]
+    def _batch(
+        self, indices: np.ndarray, draw: AugmentationDraw | None = None, losses: CorruptionDraw | None = None
+    ) -> Batch:
+        if self._corruptor is not None and losses is not None:
+            points, parts = self._corruptor(indices, losses, self._num_points)
+        else:
+            points = self._points[indices, : self._num_points]
+            parts = None if self._parts is None else self._parts[indices, : self._num_points]
         if draw is not None:
             points = apply_augmentation(points, draw)
         neighbours = None if self._neighbours is None else self._neighbours(indices)
         door = {name: values[indices] for name, values in self._targets.items()}
         targets = {name: torch.from_numpy(values) for name, values in augment_targets(door, draw).items()}
-        if self._parts is not None:
-            targets[PARTS] = torch.from_numpy(POINT_HEADS[PARTS].target(self._parts[indices]))
+        if parts is not None and self._has_part_targets:
+            targets[PARTS] = torch.from_numpy(POINT_HEADS[PARTS].target(parts))
         return Batch(torch.from_numpy(points), torch.from_numpy(self._labels[indices]), neighbours, targets)
 
 
@@ -171,8 +209,22 @@ def _concatenate(arrays: Sequence[np.ndarray]) -> np.ndarray:
     return arrays[0] if len(arrays) == 1 else np.concatenate(arrays)
 
 
+def _openings(
+    rows: Sequence[Mapping[str, str]], placement: Placement, has_door: NDArray[np.bool_]
+) -> Openings:
+    """Return the openings of crops in units of the clouds."""
+    targets = head_targets(rows, placement, ("frame", "widths"))
+    numbers = np.column_stack([targets["frame"][:, :2], targets["widths"][:, 0]])
+    numbers[~has_door] = 0
+    return Openings(*numbers.T.astype(np.float32))
+
+
 def _load(
-    dataset: PreparedDataset, sample_ids: Sequence[str], num_points: int, heads: Sequence[str]
+    dataset: PreparedDataset,
+    sample_ids: Sequence[str],
+    num_points: int,
+    heads: Sequence[str],
+    with_parts: bool,
 ) -> _Loaded:
     """Load samples of one data set; arguments and errors are those of `CloudLoader`."""
     if num_points > dataset.num_points:
@@ -189,7 +241,7 @@ def _load(
     labels = np.where(stored < len(STATES), stored, IGNORE_INDEX)
     placement = dataset.normalization.placement(points)
     targets = head_targets([dataset.rows[index] for index in indices], placement, heads)
-    parts = dataset.parts_of(indices, num_points) if PARTS in heads else None
+    parts = dataset.parts_of(indices, num_points) if with_parts else None
     has_door = stored != LABELS.index(NO_DOOR)
     return _Loaded(dataset.normalization(points), placement, labels, has_door, targets, parts)
 

@@ -138,7 +138,11 @@ class PreparedDataset:
             ConfigError: parts are not stored.
         """
         if self._parts is None:
-            raise ConfigError("holds no parts of points", path=self.folder, hint="leave out the head 'parts'")
+            raise ConfigError(
+                "holds no parts of points",
+                path=self.folder,
+                hint="leave out the head 'parts', and mixed crops",
+            )
         return np.array(self._parts[indices, :num_points])
 
     def _sample(self, index: int, num_points: int | None) -> tuple[Points, NDArray[np.uint8]]:

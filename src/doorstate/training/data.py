@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
+from doorstate.clouds.corruption import Corruption
 from doorstate.dataset.loader import CloudLoader, FindNeighbours
 from doorstate.dataset.roles import Role
 from doorstate.dataset.store import PreparedDataset
@@ -65,7 +66,11 @@ class RunData:
         return CloudLoader(self.dataset, self.samples[role], num_points, heads=self.heads)
 
     def epoch_loaders(
-        self, num_points: int, find_neighbours: FindNeighbours, keep_train_neighbours: bool
+        self,
+        num_points: int,
+        find_neighbours: FindNeighbours,
+        keep_train_neighbours: bool,
+        corruption: Corruption | None = None,
     ) -> EpochLoaders:
         """Return the loaders of an epoch.
 
@@ -73,6 +78,7 @@ class RunData:
             num_points: points of each cloud.
             find_neighbours: search of the network, done once per validation cloud.
             keep_train_neighbours: search only once per training cloud too.
+            corruption: losses of the training clouds; validation clouds have none.
         """
         train = CloudLoader(
             self.dataset,
@@ -81,6 +87,7 @@ class RunData:
             find_neighbours if keep_train_neighbours else None,
             self.heads,
             self.extra_datasets,
+            corruption,
         )
         val = CloudLoader(self.dataset, self.samples["val"], num_points, find_neighbours, self.heads)
         return EpochLoaders(train, val)

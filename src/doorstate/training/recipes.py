@@ -10,6 +10,7 @@ from pydantic import Field, SerializerFunctionWrapHandler, field_validator, mode
 
 from doorstate._models import FrozenModel, Name
 from doorstate.clouds.augmentation import Augmentation
+from doorstate.clouds.corruption import Corruption
 from doorstate.clouds.preparation import MAX_NUM_POINTS, MIN_POINTS
 from doorstate.errors import ConfigError
 
@@ -59,6 +60,7 @@ class Recipe(FrozenModel):
     batchnorm_eps: float | None = Field(default=None, gt=0, le=1)  # None: torch's 1e-5
     batchnorm_momentum: tuple[_Share, _Share] | None = None  # first and last; halved after each step
     augmentation: Augmentation = Augmentation()
+    corruption: Corruption = Corruption()  # of crops
     coarse_to_fine: tuple[CoarseStage, ...] = ()  # the last epochs use all points and centres
     # Points of each cloud in the loss of the parts; None: all.
     part_points: int | None = Field(default=None, ge=1, le=MAX_NUM_POINTS)
@@ -70,7 +72,8 @@ class Recipe(FrozenModel):
     def _leave_out_new_fields(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
         # So that runs of earlier versions go on with the recipe that they began with.
         fields: dict[str, Any] = dump(self)
-        return {name: value for name, value in fields.items() if name != "no_door_share" or value is not None}
+        new = {"no_door_share": self.no_door_share is None, "corruption": self.corruption.changes_nothing}
+        return {name: value for name, value in fields.items() if not new.get(name, False)}
 
     @field_validator("coarse_to_fine")
     @classmethod

@@ -129,8 +129,10 @@ class Trainer:
 
     @property
     def neighbours_are_fixed(self) -> bool:
-        """True if augmentation leaves the neighbourhoods of a cloud as they are, so that one search is enough."""
+        """True if no change of a cloud changes its neighbourhoods, so that one search is enough."""
         augmentation = self.config.recipe.augmentation
+        if not self.config.recipe.corruption.changes_nothing:
+            return False
         if self.network.neighbours_are_scale_invariant:
             return augmentation.is_similarity
         return augmentation.is_rigid
@@ -140,7 +142,10 @@ class Trainer:
         if self._loaders is None or self._loaders[0] != resolution:
             self.network.use_centres(resolution.centre_share)
             loaders = self.data.epoch_loaders(
-                resolution.num_points, self.network.neighbourhoods, self.neighbours_are_fixed
+                resolution.num_points,
+                self.network.neighbourhoods,
+                self.neighbours_are_fixed,
+                self.config.recipe.corruption,
             )
             self._loaders = resolution, loaders
         return self._loaders[1]
