@@ -166,6 +166,32 @@ def doorways(
 
 
 @app.command()
+def simulation(
+    out: Out,
+    presets: Annotated[
+        str, typer.Option(help="Presets with their sensors, as preset:sensor, separated by commas.")
+    ] = "varied:xtion",
+    scenes: Annotated[int, typer.Option(help="Scenes of each preset.", min=1)] = 60,
+    points: Annotated[int, typer.Option(help="Points per crop.", min=128)] = 1024,
+    device: Annotated[str, typer.Option(help="Device of batched rendering: cpu, cuda, ...")] = "cpu",
+    batches: Annotated[str, typer.Option(help="Frames rendered together, separated by commas.")] = "1,8",
+    threads: Threads = 1,
+) -> None:
+    """Time of a simulated frame from its seed to its crops on disk, by stage, and of rendering many at once."""
+    from benchmarks.simulation import batches_table, measure_batches, measure_simulation, simulation_table
+    from doorstate.cli.progress import progress_bar
+
+    pairs = [name.strip().partition(":")[::2] for name in presets.split(",")]
+    numbers = parse_integers("batches", batches, 1)
+    with progress_bar("simulation") as progress:
+        rows = measure_simulation(pairs, scenes, points, progress)
+    store_results(out, "simulation", rows, simulation_table(rows), scenes=scenes, points=points)
+    rendered = measure_batches(*pairs[0], scenes, numbers, device, threads)
+    table = batches_table(rendered, device)
+    store_results(out, "batched_rendering", rendered, table, device=device, threads=threads)
+
+
+@app.command()
 def busy(
     out: Out,
     network: Annotated[str, typer.Option(help="Packaged weights.")] = "pointnet2",

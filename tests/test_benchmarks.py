@@ -193,6 +193,25 @@ def test_time_to_every_door_is_the_sum_of_its_stages(tmp_path: Path) -> None:
         assert f"| {row['cloud']} | {row['runtime']} | 1 | {row['candidates']} | {row['doors']} |" in markdown
 
 
+def test_time_of_a_simulated_frame_is_the_sum_of_its_stages(tmp_path: Path) -> None:
+    few = ("--scenes", "1", "--batches", "1,2", "--device", "cpu")
+    code, _, errors = run("simulation", "--out", tmp_path, *few)
+    assert (code, errors) == (0, "")
+    _, rows, markdown = read_results(tmp_path, "simulation")
+    (row,) = rows
+    assert (row["preset"], row["sensor"], row["frames"]) == ("varied", "xtion", 3)
+    assert row["crops"] > 0
+    assert row["bytes_per_crop"] > 1024 * (3 * 4 + 1)
+    stages = row["stages_ms"]
+    total, processor = stages.pop("total"), stages.pop("processor")
+    assert all(duration_ms > 0 for duration_ms in (*stages.values(), processor))
+    assert sum(stages.values()) == pytest.approx(total)
+    assert "| varied | xtion | 3 |" in markdown
+    batches = read_results(tmp_path, "batched_rendering")[1]
+    assert [batch["batch"] for batch in batches] == [1, 2]
+    assert all(batch["frames_per_s"] > 0 for batch in batches)
+
+
 def test_busy_has_a_row_for_every_form_and_number_of_processes(tmp_path: Path) -> None:
     few = ("--runtimes", "onnxruntime", "--threads", "1,2", "--processes", "0,1", "--repeats", "1")
     assert run("busy", "--out", tmp_path, *few)[0] == 0

@@ -22,6 +22,7 @@ from doorstate._files import atomic_path, is_vacant, read_csv, write_csv, write_
 from doorstate._input import MAX_SETTINGS_BYTES
 from doorstate._jobs import Progress, Shard, default_workers, no_progress, piece_paths, run_pieces
 from doorstate._locks import owned_folder
+from doorstate._memory import keep_freed_memory
 from doorstate.errors import ConfigError, DatasetError, first_validation_error
 from doorstate.io.find import INDEX_FILE
 from doorstate.io.pcd import write_pcd
@@ -164,6 +165,7 @@ def _pieces(
 
 
 def _simulate_piece(piece: _Piece, path: Path) -> None:
+    keep_freed_memory()  # images of a megabyte come and go
     rows: list[Row] = []
     frames: list[Frame] = []
     for index in piece.indices:
