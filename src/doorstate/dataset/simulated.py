@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -40,11 +40,11 @@ class Sampler:
         """Return the file of the clouds of a piece."""
         return self.scratch / f"{piece}.npz"
 
-    def __call__(self, piece: str, rows: Sequence[Row], frames: Sequence[Frame]) -> None:
+    def __call__(self, piece: str, samples: Iterable[tuple[Row, Frame]]) -> None:
         """Sample the frames of a piece, and save their clouds."""
         spec = self.preparation.spec
         clouds = PieceClouds(spec.num_points)
-        for row, frame in zip(rows, frames, strict=True):
+        for row, frame in samples:
             clouds.add(samples_of_frame(row, frame, spec, self.preparation.crops))
         clouds.save(self.path(piece))
 

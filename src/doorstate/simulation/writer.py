@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -36,8 +36,9 @@ _SETTINGS = "simulation.json"
 _PIECES = "pieces"
 _POSES_PER_PIECE = 8
 
-PieceCallback = Callable[[str, Sequence[Row], Sequence[Frame]], None]
-"""Called with name, rows and frames of every piece, in the process that rendered it; it must be picklable."""
+PieceCallback = Callable[[str, Iterable[tuple[Row, Frame]]], None]
+"""Called with the name of every piece and its rows and frames, which are rendered as it takes them, in the process that
+renders them; it must be picklable."""
 
 
 class _Piece(NamedTuple):
@@ -167,15 +168,19 @@ def _pieces(
 def _simulate_piece(piece: _Piece, path: Path) -> None:
     keep_freed_memory()  # images of a megabyte come and go
     rows: list[Row] = []
-    frames: list[Frame] = []
-    for index in piece.indices:
-        new_rows, new_frames = piece.settings.simulate(index)
-        for row, frame in zip(new_rows, new_frames, strict=True):
-            _write_raw(piece.folder, row, frame, piece.settings.raw)
-        rows += new_rows
-        frames += new_frames if piece.callback else []
+
+    def samples() -> Iterator[tuple[Row, Frame]]:
+        for index in piece.indices:
+            for row, frame in zip(*piece.settings.simulate(index), strict=True):
+                _write_raw(piece.folder, row, frame, piece.settings.raw)
+                rows.append(row)
+                yield row, frame
+
+    rest = samples()
     if piece.callback:
-        piece.callback(path.stem, rows, frames)
+        piece.callback(path.stem, rest)
+    for _ in rest:
+        pass
     write_csv(path, [flatten(row) for row in rows])
 
 
