@@ -86,6 +86,13 @@ def test_panels_stay_in_line_with_the_wall_at_their_ends_and_fold_to_one_side(do
     assert all((y > face) == (swing == "towards") for y in middle_y)
 
 
+def test_panels_stop_where_they_are_folded_and_at_the_wall() -> None:
+    for share, nearest in ((1.4, OPEN), (-0.2, CLOSED)):
+        assert leaf_boxes(BI_FOLD, Opening(share=share)) == leaf_boxes(BI_FOLD, nearest)
+    tiny = BI_FOLD.model_copy(update={"opening_width_m": 0.006})
+    assert all(box.yaw_rad == 0 for box in leaf_boxes(tiny, OPEN))
+
+
 def test_the_second_panel_has_the_handle() -> None:
     door = BI_FOLD.model_copy(update={"handle": LEVER, "hinge": "right"})
     handle = leaf_boxes(door, CLOSED)[2:]

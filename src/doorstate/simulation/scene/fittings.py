@@ -19,10 +19,8 @@ _PROJECTION_M: dict[FittingKind, float] = {
     "push_bar": 0.09,
     "viewer": 0.008,
 }
-_ON_ONE_FACE = (
-    "push_plate",
-    "push_bar",
-)  # the face that is pushed: away from the side the leaf swings out to
+# On the face that is pushed: away from the side the leaf swings out to.
+_ON_ONE_FACE: tuple[FittingKind, ...] = ("push_plate", "push_bar")
 _EDGE_M = 0.015  # from a fitting to the edges of its leaf, which close against the stop
 _GRIP_M = 0.04
 _PANE_M = 0.006

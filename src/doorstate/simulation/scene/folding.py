@@ -23,9 +23,10 @@ def folding_panels(door: Door, share: float) -> list[list[Box]]:
     is_pair = door.panels != 4
     clear_m = (door.opening_width_m - 2 * door.leaf_gap_m) / (1 if is_pair else 2)
     width = clear_m / 2
-    # Panels overlap no more than a stack of two is thick.
-    least_cos = min(1.0, (door.leaf_thickness_m + _STACKED_GAP_M) / width)
-    turn = math.acos(1 - share * (1 - least_cos))
+    # The two panels of a pair stand side by side when they are folded.
+    stack_m = max(door.leaf_thickness_m, 0.0) + _STACKED_GAP_M
+    least_cos = stack_m / max(width, stack_m)
+    turn = math.acos(1 - min(max(share, 0.0), 1.0) * (1 - least_cos))
     # The pivot is in the panels' middle plane, so that both panels of a pair turn by the same angle, and moves off the
     # jamb by as much as their edge would cut into it.
     start = -door.opening_width_m / 2 + door.leaf_gap_m + door.leaf_thickness_m / 2 * math.sin(turn)
