@@ -13,7 +13,7 @@ from torch import Tensor, nn
 from benchmarks.ports import build_port
 from benchmarks.pyg import NETWORKS as PYG_NETWORKS
 from benchmarks.pyg import build_pyg
-from doorstate._environment import has_fast_bf16
+from doorstate._devices import has_fast_bf16
 from doorstate.networks import create_network
 from doorstate.networks.base import PointNetwork
 from doorstate.training.environment import compile_if_possible

@@ -17,7 +17,7 @@ from benchmarks.networks_table import networks_table
 from benchmarks.store import Result, Store
 from benchmarks.timing import MatrixSpeed
 from benchmarks.workers import Worker
-from doorstate._environment import has_fast_bf16
+from doorstate._devices import has_fast_bf16
 from doorstate._jobs import Progress
 from doorstate.errors import RunError
 from doorstate.evaluation.table import Table

@@ -14,7 +14,7 @@ from benchmarks.measured_network import MeasuredNetwork, NetworkTask
 from benchmarks.store import Result
 from benchmarks.timing import format_ms
 from benchmarks.workers import Worker
-from doorstate._environment import has_fast_bf16
+from doorstate._devices import has_fast_bf16
 from doorstate._jobs import Progress
 from doorstate.evaluation.table import UNDEFINED, Table
 

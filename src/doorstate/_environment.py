@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from doorstate import __version__
+from doorstate._devices import has_fast_bf16
 
 
 def describe_environment() -> dict[str, str | int | bool]:
@@ -56,12 +57,3 @@ def processor_name() -> str:
             if line.startswith("model name"):
                 return line.partition(":")[2].strip()
     return platform.processor() or platform.machine()
-
-
-def has_fast_bf16() -> bool:
-    """Return True if this machine multiplies bf16 matrices in hardware."""
-    import torch
-
-    if torch.cuda.is_available():
-        return bool(torch.cuda.is_bf16_supported())
-    return bool(torch.cpu._is_avx512_bf16_supported() or torch.cpu._is_amx_tile_supported())

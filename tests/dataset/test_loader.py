@@ -164,3 +164,30 @@ def test_extra_data_sets_are_appended_as_a_whole(
     assert len(loader.placement.centres) == len(loader)
     with pytest.raises(ConfigError, match="160"):
         CloudLoader(more_dataset, [], 161)
+
+
+def test_parts_of_a_batch_are_what_processes_share(dataset: PreparedDataset) -> None:
+    loader = CloudLoader(dataset, [row["sample_id"] for row in dataset.rows], 40)
+    augmentation = Augmentation(yaw_deg=20, mirror=0.5, jitter=0.01)
+    whole = list(loader.shuffled(4, augmentation, (1, 2)))
+    parts = [list(loader.shuffled(4, augmentation, (1, 2), part=(number, 2))) for number in range(2)]
+    for batch, *shares in zip(whole, *parts, strict=True):
+        assert torch.equal(torch.cat([share.points for share in shares]), batch.points)
+        assert torch.equal(torch.cat([share.labels for share in shares]), batch.labels)
+
+
+def test_batches_and_searches_are_on_the_device(dataset: PreparedDataset) -> None:
+    """The meta device stands for CUDA."""
+    searched: list[torch.device] = []
+
+    def search(points: torch.Tensor) -> tuple[torch.Tensor, ...]:
+        searched.append(points.device)
+        return (torch.zeros(*points.shape[:2], 3, dtype=torch.int64, device=points.device),)
+
+    samples = [row["sample_id"] for row in dataset.rows]
+    loader = CloudLoader(dataset, samples, 40, search, device=torch.device("meta"))
+    batch = next(loader.in_order(2))
+    assert batch.neighbourhoods is not None
+    tensors = [batch.points, batch.labels, *batch.neighbourhoods]
+    assert {tensor.device.type for tensor in tensors} == {"meta"} == {device.type for device in searched}
+    assert batch.neighbourhoods[0].dtype == torch.int64

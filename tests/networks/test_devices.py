@@ -50,7 +50,7 @@ def test_networks_train_as_on_the_cpu(
 ) -> None:
     """Relative to the norm of each tensor; in float32 one rounding can change which point wins a maximum."""
     network = create_network(name).to(dtype)
-    points = torch.rand(3, 128, 3, generator=torch.Generator().manual_seed(4)).to(dtype) * 2 - 1
+    points = torch.rand(3, 160, 3, generator=torch.Generator().manual_seed(4)).to(dtype) * 2 - 1
     expected = training_results(copy.deepcopy(network), points)
     with device_forms():
         got = training_results(network.to(device), points.to(device))
@@ -65,7 +65,7 @@ def test_networks_train_as_on_the_cpu(
 @pytest.mark.parametrize("name", NAMES)
 def test_autocast_trains_on_the_device(name: str, device: torch.device) -> None:
     network = create_network(name).to(device)
-    points = torch.rand(3, 128, 3, generator=torch.Generator().manual_seed(4)).to(device)
+    points = torch.rand(3, 160, 3, generator=torch.Generator().manual_seed(4)).to(device)
     with device_forms(), torch.autocast(device.type, dtype=torch.bfloat16):
         loss, _ = network.training_loss(points, LABELS.to(device))
         loss.backward()
@@ -112,7 +112,7 @@ def test_losses_of_heads_wait_for_no_device(has_doors: bool) -> None:
     network = create_network("pointnet")
     add_heads(network, ["door"])
     labels = LABELS if has_doors else torch.full_like(LABELS, -100)
-    points = torch.rand(3, 128, 3, generator=torch.Generator().manual_seed(4))
+    points = torch.rand(3, 160, 3, generator=torch.Generator().manual_seed(4))
     targets = {"door": torch.ones(3, 1)}
     losses, _ = joint_losses(network, points, labels, targets)
     assert losses["state"].isfinite()

@@ -13,6 +13,7 @@ from doorstate.cli.options import (
     AsJson,
     Changes,
     ComparedNetworks,
+    Device,
     Epochs,
     HeadNames,
     Jobs,
@@ -45,6 +46,7 @@ def compare(
     epochs: Epochs = None,
     head: HeadNames = None,
     changes: Changes = None,
+    device: Device = "auto",
     as_json: AsJson = False,
     jobs: Jobs = 1,
 ) -> None:
@@ -82,7 +84,7 @@ def compare(
         overrides.setdefault("num_points", open_dataset(data).num_points)
     settings = load_experiment(experiment, overrides | {"recipe_changes": changed})
     folder = out or Path("runs") / settings.name
-    metrics = compare_with_display(settings, folder, jobs)
+    metrics = compare_with_display(settings, folder, jobs, device)
     if as_json:
         for run in metrics:
             print_json(run)
@@ -98,7 +100,9 @@ def compare(
     stdout.print(f"next: doorstate report {folder}")
 
 
-def compare_with_display(experiment: Experiment, folder: Path, jobs: int) -> list[dict[str, Any]]:
+def compare_with_display(
+    experiment: Experiment, folder: Path, jobs: int, device: str = "auto"
+) -> list[dict[str, Any]]:
     """Run a comparison with a live display of its progress, and return the metrics of each run."""
     from doorstate._locks import owned_folder
     from doorstate.cli.run_display import live_runs
@@ -108,7 +112,7 @@ def compare_with_display(experiment: Experiment, folder: Path, jobs: int) -> lis
     recipes = {network: experiment.recipe_of(network) for network in experiment.networks}
     runs = plan_runs(experiment, folder)
     with owned_folder(folder), live_runs(runs, recipes, experiment.num_points, jobs) as progress:
-        return run_comparison(experiment, folder, jobs, progress)
+        return run_comparison(experiment, folder, jobs, progress, device)
 
 
 def _score_row(method: str, metrics: list[dict[str, Any]]) -> list[str]:

@@ -12,6 +12,7 @@ import typer
 from doorstate.cli.options import (
     AsJson,
     BudgetMs,
+    Device,
     LayoutName,
     NetworkNames,
     PointCount,
@@ -42,6 +43,7 @@ def evaluate(
     points: PointCount = None,
     budget_ms: BudgetMs = None,
     threads: Threads = None,
+    device: Device = "cpu",
     group: Annotated[
         str | None,
         typer.Option(
@@ -103,7 +105,7 @@ def evaluate(
         check_writable(out / PAGE)
     with nullcontext() if out is None else owned_folder(out):
         predictors = load_predictors(
-            Methods(network, weights, rule), points, budget_ms=budget_ms, threads=threads
+            Methods(network, weights, rule), points, budget_ms=budget_ms, threads=threads, device=device
         )
         with progress_bar("Predicting") as progress:
             results = evaluate_frames(predictors, frames, progress)

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
+from doorstate._devices import check_device_name
 from doorstate._documents import parse_toml
 from doorstate.cli.choices import HEAD, LAYOUT, NETWORK, PACKAGED, PROTOCOL, RECIPE, RULE
 from doorstate.errors import ConfigError
@@ -54,6 +55,15 @@ Threads = Annotated[
     typer.Option(
         help="Processor threads of one call to a network. [default: one a processor, at most 4; in serve, shared]",
         min=1,
+    ),
+]
+
+Device = Annotated[
+    str,
+    typer.Option(
+        parser=check_device_name,
+        metavar="DEVICE",
+        help="Device of the networks: auto, cpu, cuda or cuda:N; auto is a CUDA device if torch finds one.",
     ),
 ]
 

@@ -15,6 +15,7 @@ from doorstate.cli.options import (
     Bag,
     BudgetMs,
     CameraInfoTopic,
+    Device,
     DoorBox,
     DoorKnownFlag,
     DoorPose,
@@ -50,6 +51,7 @@ def predict(
     points: PointCount = None,
     budget_ms: BudgetMs = None,
     threads: Threads = None,
+    device: Device = "cpu",
     door_known: DoorKnownFlag = False,
     door_pose: DoorPose = None,
     door_box: DoorBox = None,
@@ -100,7 +102,7 @@ def predict(
         output = Output("stamp_s", "message", out, as_json)
         # The predictor is loaded after the bag was opened, because it takes longer.
         predict_bag(
-            lambda: load_predictors(methods, points, budget_ms=budget_ms, threads=threads),
+            lambda: load_predictors(methods, points, budget_ms=budget_ms, threads=threads, device=device),
             bag,
             options,
             topic,
@@ -111,7 +113,7 @@ def predict(
         )
         return
     sources = _find(files or [])[::every]
-    predictors = load_predictors(methods, points, budget_ms=budget_ms, threads=threads)
+    predictors = load_predictors(methods, points, budget_ms=budget_ms, threads=threads, device=device)
     indexed = IndexedOptions(options)
     clouds = (_predict_file(predictors, source, indexed, door) for source in sources)
     names = [_name(source) for source in sources if isinstance(source, Path)]

@@ -52,10 +52,12 @@ def load_predictors(
     budget_ms: float | None = None,
     threads: int | None = None,
     for_view: bool = False,
+    device: str = "cpu",
 ) -> dict[str, Predictor]:
     """Load and warm up the networks and rules by name; the default network if none is named.
 
-    Points and time budget are those of the networks; beside networks, rules use all points. With `for_view` torch runs
+    Points and time budget are those of the networks; beside networks, rules use all points. The device is
+    that of the networks. With `for_view` torch runs
     packaged networks where it is installed, because only torch shows which points decided.
 
     Raises:
@@ -68,7 +70,8 @@ def load_predictors(
 
     choices = methods.choices()
     mixed = any(choice is not None for choice in choices.values())
-    configure_torch(threads, used=any(path.suffix == ".safetensors" for path in methods.weights or ()))
+    uses_torch = device != "cpu" or any(path.suffix == ".safetensors" for path in methods.weights or ())
+    configure_torch(threads, used=uses_torch)
     predictors = {}
     for name, choice in choices.items():
         is_plain = choice is None and mixed
@@ -79,6 +82,7 @@ def load_predictors(
                 num_points=None if is_plain else points,
                 budget_ms=None if is_plain else budget_ms,
                 threads=threads,
+                device=device,
                 backend="torch" if isinstance(choice, str) and for_view and is_installed("torch") else None,
             )
             predictor.warm_up()

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -12,6 +13,7 @@ from doorstate.cli.choices import split_names
 from doorstate.cli.options import (
     AsJson,
     Changes,
+    Device,
     Epochs,
     HeadNames,
     Protocol,
@@ -35,24 +37,33 @@ def train(
     epochs: Epochs = None,
     head: HeadNames = None,
     changes: Changes = None,
+    device: Device = "auto",
+    devices: Annotated[
+        int, typer.Option(help="Devices that train together, each on its share of every batch.", min=1)
+    ] = 1,
     as_json: AsJson = False,
 ) -> None:
     """Train one network on one fold.
 
-    The folder gets weights, predictions and metrics. An interrupted run continues where it stopped.
+    The folder gets weights, predictions and metrics. An interrupted run continues where it stopped. Several devices
+    train one network with --devices, or with torchrun on several machines that share the folder.
 
     \b
     Examples:
       doorstate train --network pointnet2 --data data/ogurob-4096 --points 1024 --epochs 12 --out runs/first
       doorstate train --network dgcnn --data data/ogurob-4096 --recipe authors --set batch_size=16 --out runs/dgcnn
+      doorstate train --network dgcnn --data data/ogurob-4096 --device cuda --devices 4 --out runs/four
       doorstate train --network pointnet2 --data data/varied-4096 --head door --head angle --out runs/heads
     """
+    from contextlib import nullcontext
+
     from doorstate._locks import owned_folder
     from doorstate.cli.console import print_json, stdout
     from doorstate.cli.run_display import live_runs
     from doorstate.dataset.store import open_dataset
     from doorstate.training.comparison import RunSpec, train_alone
     from doorstate.training.experiment import load_experiment
+    from doorstate.training.ranks import check_devices, is_rank, joined_ranks, launch_ranks
     from doorstate.training.run_folder import RunFolder
 
     dataset = open_dataset(data)
@@ -68,12 +79,20 @@ def train(
         **{name: value for name, value in given.items() if value is not None},
     }
     experiment = load_experiment(None, settings)
+    if devices > 1 and not is_rank():
+        check_devices(device, devices)
+        launch_ranks(devices, sys.argv[1:])
+        return
     runs = [RunSpec(network, fold, RunFolder(out))]
-    with (
-        owned_folder(out),
-        live_runs(runs, {network: experiment.recipe_of(network)}, experiment.num_points, 1),
-    ):
-        metrics = train_alone(experiment, out, dataset, network, fold)
+    recipes = {network: experiment.recipe_of(network)}
+    with joined_ranks(device) as (place, ranks):
+        with (
+            owned_folder(out) if ranks.is_first else nullcontext(),
+            live_runs(runs, recipes, experiment.num_points, 1) if ranks.is_first else nullcontext(),
+        ):
+            metrics = train_alone(experiment, out, dataset, network, fold, place, ranks)
+        if not ranks.is_first:
+            return
     if as_json:
         print_json(metrics)
         return

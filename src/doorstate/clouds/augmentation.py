@@ -51,6 +51,11 @@ class AugmentationDraw(NamedTuple):
     shift: NDArray[np.float32]  # (B, 1, 3)
     jitter: NDArray[np.float32] | None  # (B, N, 3)
 
+    def part(self, clouds: slice) -> AugmentationDraw:
+        """Return the changes of some of the clouds."""
+        jitter = None if self.jitter is None else self.jitter[clouds]
+        return AugmentationDraw(self.linear[clouds], self.shift[clouds], jitter)
+
 
 def draw_augmentation(
     augmentation: Augmentation, rng: np.random.Generator, clouds: int, points: int, across: int = 1

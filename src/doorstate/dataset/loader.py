@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -21,14 +21,14 @@ from doorstate.clouds.augmentation import (
 from doorstate.clouds.corruption import Corruption, CorruptionDraw
 from doorstate.clouds.normalization import Placement
 from doorstate.dataset.corruptor import Corruptor, Openings
+from doorstate.dataset.neighbour_cache import FindNeighbours, NeighbourCache, to_device
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import ConfigError
 from doorstate.networks.heads import IGNORE_INDEX, POINT_HEADS, augment_targets, head_targets
 from doorstate.types import DOOR, LABELS, NO_DOOR, PARTS, STATES
 
 MOST_STORED = 2  # points that are held for each point of a corrupted cloud, if a data set stores as many
-FindNeighbours = Callable[[Tensor], tuple[Tensor, ...]]
-"""From (B, n, 3) points to (B, ...) int64 indices into them."""
+_CPU = torch.device("cpu")
 
 
 class Batch(NamedTuple):
@@ -76,6 +76,7 @@ class CloudLoader:
         heads: Sequence[str] = (),
         extra_datasets: Sequence[PreparedDataset] = (),
         corruption: Corruption | None = None,
+        device: torch.device = _CPU,
     ) -> None:
         """Load clouds.
 
@@ -90,6 +91,7 @@ class CloudLoader:
             extra_datasets: data sets to append as a whole.
             corruption: random losses of shuffled crops, which change neighbours. Lost points are replaced by later
                 ones where the data sets store more than `num_points`; the rest is repeated.
+            device: device of the batches and of the search.
 
         Raises:
             ConfigError: a data set has fewer points, samples have no state, the parts of points are not stored, or
@@ -118,8 +120,11 @@ class CloudLoader:
         }
         parts = [samples.parts for samples in loaded if samples.parts is not None]
         self._parts = _concatenate(parts) if parts else None
+        self._device = device
+        self._neighbours = None
+        if find_neighbours is not None:
+            self._neighbours = NeighbourCache(find_neighbours, self._points, device)
         self._has_part_targets = PARTS in heads
-        self._neighbours = None if find_neighbours is None else _NeighbourCache(find_neighbours, self._points)
         self._corruptor = None
         if corruption is not None:
             rows = [
@@ -150,6 +155,7 @@ class CloudLoader:
         skip: int = 0,
         limit: int | None = None,
         no_door_share: float | None = None,
+        part: tuple[int, int] = (0, 1),
     ) -> Iterator[Batch]:
         """Yield one training epoch, shuffled, corrupted and augmented, without an incomplete last batch.
 
@@ -161,19 +167,24 @@ class CloudLoader:
             limit: number of random clouds in the epoch; None is all.
             no_door_share: share of clouds without a door in the epoch; the others, or these, are then drawn more
                 often. None: as in the data.
+            part: (number, of equal parts) of each batch to yield; what is drawn does not depend on it.
         """
         rng = np.random.default_rng(seed)
         if no_door_share is None:
             order = rng.permutation(len(self))[:limit]
         else:
             order = self._draw(rng, min(len(self), limit or len(self)), no_door_share)
-        batch_size = min(batch_size, len(order))
+        number_of_part, parts = part
+        share = min(batch_size, len(order)) // parts
+        batch_size = share * parts
+        own = slice(number_of_part * share, (number_of_part + 1) * share)
         across = self._normalization.across
         for number, start in enumerate(range(0, len(order) - batch_size + 1, batch_size)):
             draw = draw_augmentation(augmentation, rng, batch_size, self._num_points, across)
             losses = None if self._corruptor is None else self._corruptor.draw(rng, batch_size)
             if number >= skip:
-                yield self._batch(order[start : start + batch_size], draw, losses)
+                own_losses = None if losses is None else CorruptionDraw(*(values[own] for values in losses))
+                yield self._batch(order[start : start + batch_size][own], draw.part(own), own_losses)
 
     def _draw(self, rng: np.random.Generator, count: int, no_door_share: float) -> np.ndarray:
         """Return the numbers of `count` samples in random order, with a share of those without a door."""
@@ -201,7 +212,14 @@ class CloudLoader:
         targets = {name: torch.from_numpy(values) for name, values in augment_targets(door, draw).items()}
         if parts is not None and self._has_part_targets:
             targets[PARTS] = torch.from_numpy(POINT_HEADS[PARTS].target(parts))
-        return Batch(torch.from_numpy(points), torch.from_numpy(self._labels[indices]), neighbours, targets)
+        labels = torch.from_numpy(self._labels[indices])
+        on_device = {name: to_device(target, self._device) for name, target in targets.items()}
+        return Batch(
+            to_device(torch.from_numpy(points), self._device),
+            to_device(labels, self._device),
+            neighbours,
+            on_device,
+        )
 
 
 def _concatenate(arrays: Sequence[np.ndarray]) -> np.ndarray:
@@ -244,31 +262,3 @@ def _load(
     parts = dataset.parts_of(indices, num_points) if with_parts else None
     has_door = stored != LABELS.index(NO_DOOR)
     return _Loaded(dataset.normalization(points), placement, labels, has_door, targets, parts)
-
-
-class _NeighbourCache:
-    """Neighbours of clouds by their row numbers, searched at the first request."""
-
-    def __init__(self, find: FindNeighbours, points: np.ndarray) -> None:
-        self._find, self._points = find, points
-        self._searched = torch.zeros(len(points), dtype=torch.bool)
-        self._cache: tuple[Tensor, ...] = ()
-
-    def __call__(self, indices: np.ndarray) -> tuple[Tensor, ...]:
-        clouds = torch.from_numpy(indices)
-        new = clouds[~self._searched[clouds]]
-        if len(new):
-            self._search(new)
-        return tuple(cached[clouds].long() for cached in self._cache)
-
-    @torch.no_grad()
-    def _search(self, new: Tensor) -> None:
-        neighbours = self._find(torch.from_numpy(self._points[new.numpy()]))
-        if not self._cache:
-            count, num_points, _ = self._points.shape
-            # A cloud can have a million indices.
-            smallest = torch.int16 if num_points <= 2**15 else torch.int32
-            self._cache = tuple(torch.empty(count, *part.shape[1:], dtype=smallest) for part in neighbours)
-        for cached, part in zip(self._cache, neighbours, strict=True):
-            cached[new] = part.to(cached.dtype)
-        self._searched[new] = True

@@ -94,6 +94,7 @@ class NetworkPredictor(Predictor):
         gate: Gate | None = DEFAULT_GATE,
         threads: int | None = None,
         backend: str | None = None,
+        device: str = "cpu",
         clock: Callable[[], float] = time.perf_counter,
     ) -> NetworkPredictor:
         """Load packaged weights by name or a weights file by path; arguments as in `Predictor.load` and the class.
@@ -111,7 +112,7 @@ class NetworkPredictor(Predictor):
             )
         if threads is not None and threads < 1:
             raise ConfigError(f"a call needs a thread, not {threads}", field="threads", expected="1 or more")
-        loaded = load_backend(name_or_path, threads, backend)
+        loaded = load_backend(name_or_path, threads, backend, device)
 
         predictor = cls.for_card(loaded.card)
 

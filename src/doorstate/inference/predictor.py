@@ -45,6 +45,7 @@ class Predictor(ABC):
         gate: Gate | None = DEFAULT_GATE,
         threads: int | None = None,
         backend: str | None = None,
+        device: str = "cpu",
     ) -> Predictor:
         """Load packaged weights by name, a weights file by path, or a rule by name.
 
@@ -58,10 +59,12 @@ class Predictor(ABC):
             gate: rejects clouds in which too much is missing; None rejects nothing.
             threads: processor threads of one call to onnxruntime; None: OMP_NUM_THREADS if it
                 is set, else one a processor, at most four. Torch's are a setting of the process.
-            backend: "onnxruntime" or "torch"; None: torch for a `.safetensors` file, else onnxruntime.
+            backend: "onnxruntime" or "torch"; None: torch for a `.safetensors` file or a CUDA device, else onnxruntime.
+            device: "cpu", "cuda" or "cuda:N" of the network; "auto" is a CUDA device if torch finds one. Everything
+                else, and every rule, runs on the processor.
 
         Raises:
-            ConfigError: options that exclude each other, or no such rule, or an impossible number of points.
+            ConfigError: options that exclude each other, or no such rule or device, or an impossible number of points.
             WeightsError: no such weights, or they cannot be used.
             MissingExtraError: torch is needed and not installed.
         """
@@ -83,6 +86,7 @@ class Predictor(ABC):
             gate=gate,
             threads=threads,
             backend=backend,
+            device=device,
         )
 
     @property

@@ -42,6 +42,8 @@ class PointNetwork(nn.Module, ABC):
     """Channels of `features`."""
     head: nn.Module
     """From features to logits."""
+    num_ranks = 1
+    """Number of processes that share each batch of the training."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -65,6 +67,15 @@ class PointNetwork(nn.Module, ABC):
         Networks without a fixed number of centres do not change.
         """
         return
+
+    def use_ranks(self, count: int) -> None:
+        """Train with the statistics of batches that `count` processes of torch.distributed share equally.
+
+        The mean of the ranks' losses, and of their gradients, is then that of the whole batch.
+        """
+        for module in self.modules():
+            if hasattr(module, "num_ranks"):
+                module.num_ranks = count  # type: ignore[assignment]
 
     @abstractmethod
     def encode(self, points: Tensor, neighbourhoods: Neighbourhoods | None = None) -> Encoding:

@@ -14,6 +14,7 @@ from torch import Tensor, nn
 from doorstate.networks.base import Encoding, Neighbourhoods, PointNetwork
 from doorstate.networks.kernels.precision import full_precision
 from doorstate.networks.layers.dense import classification_head
+from doorstate.networks.layers.rank_norm import normalize_over_ranks
 
 # Azimuth and elevation of the cameras in degrees. A depth camera sees the front of objects only, so the views lie on
 # its side, spread until the leaf is seen edge-on from one of them, and one looks down.
@@ -21,6 +22,20 @@ VIEWS_DEG = ((0, 0), (-60, 15), (-30, 15), (30, 15), (60, 15), (0, 45), (0, 89.9
 PIXELS = 64
 HALF_WIDTH = 1.25  # of the image in units of the cloud: 3.75 m to each side of its centre
 WIDTHS = (16, 32, 64, 128)
+
+
+class ImageBatchNorm(nn.BatchNorm2d):
+    """Batch normalisation of (B, C, H, W) images."""
+
+    num_ranks = 1
+    """Number of processes that share the batch."""
+
+    def forward(self, images: Tensor) -> Tensor:
+        if not (self.training and self.num_ranks > 1):
+            return super().forward(images)
+        rows = images.movedim(1, -1)  # (B, H, W, C)
+        normalized = normalize_over_ranks(self, rows.flatten(0, 2), self.num_ranks)
+        return normalized.view(rows.shape).movedim(-1, 1)
 
 
 class MVCNN(PointNetwork):
@@ -42,7 +57,7 @@ class MVCNN(PointNetwork):
         for width in WIDTHS:
             layers += [
                 nn.Conv2d(channels, width, 3, padding=1, bias=False),
-                nn.BatchNorm2d(width),
+                ImageBatchNorm(width),
                 nn.ReLU(inplace=True),
                 nn.MaxPool2d(2),
             ]

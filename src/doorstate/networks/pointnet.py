@@ -84,7 +84,9 @@ class PointNet(PointNetwork):
         """
         loss, logits = super().loss_from_encoding(encoding, labels, label_smoothing)
         transform, _ = encoding.intermediate
-        return loss + self.regularizer_weight * orthogonality_penalty(transform), logits
+        # The mean over ranks is a part of the sum.
+        weight = self.regularizer_weight * self.num_ranks
+        return loss + weight * orthogonality_penalty(transform), logits
 
     def part_branch(self, num_parts: int) -> nn.Module:
         return PartBranch(num_parts)

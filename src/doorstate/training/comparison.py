@@ -4,9 +4,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import torch
 from pydantic import ValidationError
 
 from doorstate._documents import read_json
@@ -22,6 +25,7 @@ from doorstate.training.config import RunConfig
 from doorstate.training.contents import contents_of_comparison, keep_contents
 from doorstate.training.experiment import Experiment
 from doorstate.training.leakage import check_extra_datasets, check_start_from
+from doorstate.training.ranks import ALONE, Ranks
 from doorstate.training.rule_run import RuleRunConfig, run_rule
 from doorstate.training.run import torch_threads, train_run
 from doorstate.training.run_folder import RunFolder, check_same_settings, run_of, write_json
@@ -43,6 +47,7 @@ class _Piece(NamedTuple):
     method: str
     fold: int
     threads: int | None
+    device: str
 
 
 def plan_runs(experiment: Experiment, folder: Path) -> list[RunSpec]:
@@ -55,7 +60,11 @@ def plan_runs(experiment: Experiment, folder: Path) -> list[RunSpec]:
 
 
 def compare(
-    experiment: Experiment, folder: Path, jobs: int = 1, progress: Progress = no_progress
+    experiment: Experiment,
+    folder: Path,
+    jobs: int = 1,
+    progress: Progress = no_progress,
+    device: str = "auto",
 ) -> list[dict[str, Any]]:
     """Train and test every network, and test every rule, on every fold.
 
@@ -66,6 +75,7 @@ def compare(
         folder: folder of the comparison: `comparison.json`, `splits.csv`, `runs/<method>/fold<k>/`.
         jobs: number of runs at the same time, which share the processors equally.
         progress: called with the numbers of finished runs and of all runs.
+        device: name of the device that networks are trained on, as for `--device`.
 
     Returns:
         Metrics of every run.
@@ -78,7 +88,7 @@ def compare(
         prepare_comparison(experiment, folder)
         runs = plan_runs(experiment, folder)
         threads = max(1, default_workers() // jobs) if jobs > 1 else None
-        pieces = [_Piece(experiment, folder, run.method, run.fold, threads) for run in runs]
+        pieces = [_Piece(experiment, folder, run.method, run.fold, threads, device) for run in runs]
         run_pieces(_run_piece, pieces, [run.folder.metrics for run in runs], jobs, progress)
         return [run.folder.read_metrics() for run in runs]
 
@@ -134,17 +144,24 @@ def read_comparison(folder: Path) -> dict[str, Any]:
 
 
 def train_alone(
-    experiment: Experiment, folder: Path, dataset: PreparedDataset, network: str, fold: int
+    experiment: Experiment,
+    folder: Path,
+    dataset: PreparedDataset,
+    network: str,
+    fold: int,
+    device: str | torch.device = "auto",
+    ranks: Ranks = ALONE,
 ) -> dict[str, Any]:
     """Draw the splits, unless the folder has them, and train one network on one fold, all in the folder of the run.
 
     Arguments, result and errors are those of `train_fold`.
     """
     splits_path = folder / "splits.csv"
-    with owned_folder(folder):
-        if not splits_path.is_file():
+    with owned_folder(folder) if ranks.is_first else nullcontext():
+        if ranks.is_first and not splits_path.is_file():
             write_splits(splits_path, draw_splits(dataset.rows, experiment.protocol, experiment.seed))
-        return train_fold(experiment, folder, dataset, network, fold, splits_path)
+        ranks.wait()
+        return train_fold(experiment, folder, dataset, network, fold, splits_path, device, ranks)
 
 
 def train_fold(
@@ -154,6 +171,8 @@ def train_fold(
     network: str,
     fold: int,
     splits_path: Path,
+    device: str | torch.device = "auto",
+    ranks: Ranks = ALONE,
 ) -> dict[str, Any]:
     """Train one network of an experiment on one fold.
 
@@ -164,6 +183,8 @@ def train_fold(
         network: name of the network.
         fold: number of the fold, from 0.
         splits_path: `splits.csv` of the comparison.
+        device: as for `train_run`.
+        ranks: as for `train_run`.
 
     Returns:
         Metrics of the run.
@@ -188,7 +209,7 @@ def train_fold(
         extra_train_datasets=extra_train_datasets,
     )
     extra_datasets = [open_dataset(Path(path)) for path in extra_train_datasets]
-    return train_run(config, dataset, _roles_of(splits_path, fold), folder, extra_datasets)
+    return train_run(config, dataset, _roles_of(splits_path, fold), folder, extra_datasets, device, ranks)
 
 
 def apply_rule(
@@ -228,7 +249,9 @@ def _start_weights(experiment: Experiment, network: str, fold: int) -> str | Non
 
 
 def _run_piece(piece: _Piece, path: Path) -> None:
-    run = apply_rule if piece.method in piece.experiment.rules else train_fold
     with torch_threads(piece.threads):
         dataset = open_dataset(Path(piece.experiment.dataset))
+        run = (
+            apply_rule if piece.method in piece.experiment.rules else partial(train_fold, device=piece.device)
+        )
         run(piece.experiment, path.parent, dataset, piece.method, piece.fold, piece.folder / "splits.csv")

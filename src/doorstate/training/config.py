@@ -35,6 +35,6 @@ class RunConfig(FrozenModel):
         eps = self.recipe.batchnorm_eps
         return self.network_options | ({} if eps is None else {"batchnorm_eps": eps})
 
-    def torch_seed(self, stage: int) -> int:
-        """Seed of torch for a stage: 0 for the initial weights, `epoch + 1` for an epoch."""
-        return int(np.random.SeedSequence([self.seed, self.fold, stage]).generate_state(1)[0])
+    def torch_seed(self, stage: int, *part: int) -> int:
+        """Seed of torch for a stage: 0 for the initial weights, `epoch + 1` for an epoch; or for a part of it."""
+        return int(np.random.SeedSequence([self.seed, self.fold, stage, *part]).generate_state(1)[0])

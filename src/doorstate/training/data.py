@@ -6,8 +6,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
+import torch
+
 from doorstate.clouds.corruption import Corruption
-from doorstate.dataset.loader import CloudLoader, FindNeighbours
+from doorstate.dataset.loader import CloudLoader
+from doorstate.dataset.neighbour_cache import FindNeighbours
 from doorstate.dataset.roles import Role
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import DatasetError
@@ -33,6 +36,7 @@ class RunData:
         roles: Mapping[str, Role],
         heads: Sequence[str],
         extra_datasets: Sequence[PreparedDataset] = (),
+        device: torch.device | None = None,
     ) -> None:
         """Sort the samples.
 
@@ -41,11 +45,13 @@ class RunData:
             roles: {sample_id: role}.
             heads: names of heads; the loaders return their targets.
             extra_datasets: data sets of which all samples are trained on.
+            device: device of the batches; None is the processor.
 
         Raises:
             DatasetError: a role has too few samples, or none with a state.
         """
         self.dataset, self.heads, self.extra_datasets = dataset, heads, extra_datasets
+        self.device = device or torch.device("cpu")
         self.samples: dict[Role, list[str]] = {
             role: [sample for sample, sample_role in roles.items() if sample_role == role] for role in _ROLES
         }
@@ -63,7 +69,7 @@ class RunData:
 
     def loader(self, role: Role, num_points: int) -> CloudLoader:
         """Return a loader of the fold's samples of one role, without neighbourhoods."""
-        return CloudLoader(self.dataset, self.samples[role], num_points, heads=self.heads)
+        return CloudLoader(self.dataset, self.samples[role], num_points, heads=self.heads, device=self.device)
 
     def epoch_loaders(
         self,
@@ -88,8 +94,11 @@ class RunData:
             self.heads,
             self.extra_datasets,
             corruption,
+            self.device,
         )
-        val = CloudLoader(self.dataset, self.samples["val"], num_points, find_neighbours, self.heads)
+        val = CloudLoader(
+            self.dataset, self.samples["val"], num_points, find_neighbours, self.heads, device=self.device
+        )
         return EpochLoaders(train, val)
 
     def _check_roles(self) -> None:

@@ -56,22 +56,21 @@ class NetworkOutputs(NamedTuple):
 def network_outputs(
     network: PointNetwork, loader: CloudLoader, fabric: lightning_fabric.Fabric
 ) -> NetworkOutputs:
-    """Return the outputs of a network for all samples of a loader."""
+    """Return the outputs of a network for all samples of a loader, which yields them on the device of the network."""
     network.eval()
     outputs: defaultdict[str, list[Tensor]] = defaultdict(list)
     part_counts = None
     for batch in loader.in_order(_BATCH_SIZE):
-        on_device = fabric.to_device(batch)
         with fabric.autocast():
-            batch_outputs = head_outputs(network, on_device.points, on_device.neighbourhoods)
+            batch_outputs = head_outputs(network, batch.points, batch.neighbourhoods)
         if PARTS in batch_outputs:
             predicted = batch_outputs.pop(PARTS).argmax(-1).cpu().numpy()
-            counts = POINT_HEADS[PARTS].confusion(batch.targets[PARTS].numpy(), predicted)
+            counts = POINT_HEADS[PARTS].confusion(batch.targets[PARTS].cpu().numpy(), predicted)
             part_counts = counts if part_counts is None else part_counts + counts
         for name, values in batch_outputs.items():
-            outputs[name].append(values.float().cpu())
+            outputs[name].append(values.float())
         outputs["labels"].append(batch.labels)
-    joined = {name: torch.cat(values) for name, values in outputs.items()}
+    joined = {name: torch.cat(values).cpu() for name, values in outputs.items()}
     logits, labels = joined.pop(STATE), joined.pop("labels")
     loss = functional.cross_entropy(logits, labels, ignore_index=IGNORE_INDEX).item()
     head_values = {name: values.numpy() for name, values in joined.items()}

@@ -5,14 +5,15 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
 import lightning_fabric
 import torch
 
-from doorstate._environment import describe_environment, has_fast_bf16
+from doorstate._devices import describe_device, has_fast_bf16, resolve_device
+from doorstate._environment import describe_environment
 from doorstate._locks import owned_folder
 from doorstate._memory import keep_freed_memory
 from doorstate.dataset.roles import Role
@@ -29,6 +30,7 @@ from doorstate.training.config import RunConfig
 from doorstate.training.contents import contents_of_run, keep_contents
 from doorstate.training.data import RunData
 from doorstate.training.network_outputs import network_outputs
+from doorstate.training.ranks import ALONE, Ranks
 from doorstate.training.recipes import Recipe
 from doorstate.training.run_folder import RunFolder, write_head_outputs, write_predictions
 from doorstate.training.trainer import Trainer
@@ -40,6 +42,8 @@ def train_run(
     roles: Mapping[str, Role],
     folder: Path,
     extra_datasets: Sequence[PreparedDataset] = (),
+    device: str | torch.device = "auto",
+    ranks: Ranks = ALONE,
 ) -> dict[str, Any]:
     """Train, choose the epoch on the validation samples, and evaluate the test samples once.
 
@@ -50,12 +54,14 @@ def train_run(
             tested, which makes weights for use.
         folder: folder of the run; a finished run is returned, an unfinished one continued.
         extra_datasets: opened data sets of `config.extra_train_datasets`.
+        device: name of a device as for `--device`, or the device of this process.
+        ranks: processes that train together (`training.ranks`); the first validates, tests and writes.
 
     Returns:
-        Metrics as in `metrics.json`.
+        Metrics as in `metrics.json`, the same on all ranks.
 
     Raises:
-        ConfigError: there are no epochs and no weights to start from.
+        ConfigError: there are no epochs and no weights to start from, or there is no such device.
         RunError: the folder holds another run or began with other data, or the loss is not finite.
         FolderInUseError: another process works in the folder.
         DatasetError: a role has too few samples.
@@ -65,8 +71,11 @@ def train_run(
         raise ConfigError(
             "a run of 0 epochs needs weights to start from", field="epochs", expected="1 or more"
         )
-    with owned_folder(folder):
-        return _train(config, dataset, roles, RunFolder(folder), extra_datasets)
+    place = resolve_device(device) if isinstance(device, str) else device
+    with owned_folder(folder) if ranks.is_first else nullcontext():
+        metrics = _train(config, dataset, roles, RunFolder(folder), extra_datasets, place, ranks)
+    ranks.wait()
+    return RunFolder(folder).read_metrics() if metrics is None else metrics
 
 
 def _train(
@@ -75,27 +84,35 @@ def _train(
     roles: Mapping[str, Role],
     run: RunFolder,
     extra_datasets: Sequence[PreparedDataset],
-) -> dict[str, Any]:
-    run.claim(config.model_dump(mode="json"), describe_environment())
+    device: torch.device,
+    ranks: Ranks,
+) -> dict[str, Any] | None:
+    """Return the metrics on the first rank, None on the others; arguments and errors are those of `train_run`."""
+    if ranks.is_first:
+        place = {"device": describe_device(device), "ranks": ranks.size}
+        run.claim(config.model_dump(mode="json"), describe_environment() | place)
     extra_folders = [extra.folder for extra in extra_datasets]
 
     def check_unchanged() -> None:
-        keep_contents(run.path, contents_of_run(dataset.folder, roles, extra_folders, config.start_from))
+        if ranks.is_first:
+            keep_contents(run.path, contents_of_run(dataset.folder, roles, extra_folders, config.start_from))
 
     check_unchanged()
-    if run.finished:
+    if ranks.agree(run.finished):
         return run.read_metrics()
-    data = RunData(dataset, roles, config.heads, extra_datasets)
+    data = RunData(dataset, roles, config.heads, extra_datasets, device)
     keep_freed_memory()
-    fabric = create_fabric(config.recipe)
-    with torch.random.fork_rng():
+    fabric = create_fabric(config.recipe, device)
+    with torch.random.fork_rng([device] if device.type == "cuda" else []):
         torch.manual_seed(config.torch_seed(0))
         network = build_network(config)
+        state = TrainingState()
+        if config.recipe.epochs:
+            state = Trainer(config, fabric, network, data, run, ranks).train()
+        if not ranks.is_first:
+            return None
         if config.recipe.epochs == 0:
             save_weights(run.weights, network, read_card(Path(str(config.start_from))))
-            state = TrainingState()
-        else:
-            state = Trainer(config, fabric, network, data, run).train()
         metrics = evaluate_run(config, fabric, network, data, run, state)
     check_unchanged()
     run.finish(metrics)
@@ -170,12 +187,14 @@ def evaluate_run(
     return metrics
 
 
-def create_fabric(recipe: Recipe) -> lightning_fabric.Fabric:
-    """Return the device and precision of a recipe: a GPU if there is one."""
+def create_fabric(recipe: Recipe, device: torch.device) -> lightning_fabric.Fabric:
+    """Return a device and the precision of a recipe on it."""
     logging.getLogger("lightning_fabric").setLevel(logging.WARNING)  # it announces the precision of every run
-    bf16 = recipe.precision == "bf16" or (recipe.precision == "auto" and has_fast_bf16())
+    bf16 = recipe.precision == "bf16" or (recipe.precision == "auto" and has_fast_bf16(device))
     return lightning_fabric.Fabric(
-        accelerator="auto", devices=1, precision="bf16-mixed" if bf16 else "32-true"
+        accelerator=device.type,
+        devices=[device.index or 0] if device.type == "cuda" else 1,
+        precision="bf16-mixed" if bf16 else "32-true",
     )
 
 

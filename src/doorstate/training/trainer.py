@@ -14,7 +14,7 @@ import torch
 from torch import Tensor
 
 from doorstate.dataset.loader import Batch, CloudLoader
-from doorstate.errors import RunError
+from doorstate.errors import ConfigError, RunError
 from doorstate.networks.base import PointNetwork
 from doorstate.networks.card import WeightsCard
 from doorstate.networks.head_layers import joint_losses
@@ -26,6 +26,7 @@ from doorstate.training.data import EpochLoaders, RunData
 from doorstate.training.environment import compile_if_possible
 from doorstate.training.network_outputs import network_outputs
 from doorstate.training.optimizers import create_optimizers
+from doorstate.training.ranks import ALONE, Ranks
 from doorstate.training.run_folder import RunFolder
 from doorstate.training.schedules import RateSchedule, Resolution, batchnorm_momentum, resolution_of_epoch
 
@@ -47,6 +48,7 @@ class Trainer:
         network: PointNetwork,
         data: RunData,
         run: RunFolder,
+        ranks: Ranks = ALONE,
     ) -> None:
         """Prepare the training.
 
@@ -55,14 +57,23 @@ class Trainer:
             fabric: device and precision.
             network: initial weights.
             data: samples.
-            run: folder for weights, log and checkpoint.
+            run: folder for weights, log and checkpoint, which the first rank writes.
+            ranks: processes that train together, each on an equal part of every batch.
 
         Raises:
             RunError: the checkpoint is damaged.
+            ConfigError: the ranks cannot share a batch equally.
         """
-        self.config, self.fabric, self.data, self.run = config, fabric, data, run
+        self.config, self.fabric, self.data, self.run, self.ranks = config, fabric, data, run, ranks
         self.network = network.to(fabric.device)
+        self.network.use_ranks(ranks.size)
         recipe = config.recipe
+        if recipe.batch_size % ranks.size:
+            raise ConfigError(
+                f"{ranks.size} processes cannot share batches of {recipe.batch_size}",
+                field="batch_size",
+                expected=f"a multiple of {ranks.size}",
+            )
         self.iterations_per_epoch = max(
             1, min(data.num_train, recipe.clouds_per_epoch or data.num_train) // recipe.batch_size
         )
@@ -102,7 +113,7 @@ class Trainer:
             "train_loss": loss,
         }
         score = (0.0, float(epoch))  # without validation samples the last epoch is the best
-        if len(loaders.val):
+        if len(loaders.val) and self.ranks.is_first:
             validation = network_outputs(self.network, loaders.val, self.fabric)
             score = (validation.macro_f1, -validation.loss)
             entry |= {"val_loss": validation.loss, "val_macro_f1": validation.macro_f1}
@@ -110,22 +121,24 @@ class Trainer:
         is_full = resolution == Resolution(self.config.num_points, 1.0)
         if is_full and score > self.state.best_score:
             self.state.best_score, self.state.best_epoch = score, epoch
-            save_weights(self.run.weights, self.network, self._card())
+            if self.ranks.is_first:
+                save_weights(self.run.weights, self.network, self._card())
         self.state.log.append(entry | {"seconds": time.perf_counter() - started})
         self._save_checkpoint(None)
 
-    def train_step(self, batch: Batch) -> float:
-        """Return the loss of a batch, and update the weights."""
+    def train_step(self, batch: Batch) -> Tensor:
+        """Return the loss of a batch, without waiting for it, and update the weights."""
         recipe = self.config.recipe
         self.network.zero_grad(set_to_none=True)
         with self.fabric.autocast():
             loss = self._loss(batch)
         loss.backward()  # type: ignore[no-untyped-call]
+        loss = self.ranks.average(self.network, loss.detach())
         if recipe.gradient_clip is not None:
             torch.nn.utils.clip_grad_norm_(self.network.parameters(), recipe.gradient_clip)
         for optimizer in self.optimizers:
             optimizer.step()
-        return float(loss.detach())
+        return loss
 
     @property
     def neighbours_are_fixed(self) -> bool:
@@ -154,10 +167,10 @@ class Trainer:
         """Return the last learning rate and the mean loss of an epoch."""
         config, recipe = self.config, self.config.recipe
         torch.manual_seed(config.torch_seed(epoch + 1))  # dropout
-        losses: list[float] = []
+        losses: list[float | Tensor] = []
         rate = 0.0
         if self.state.progress is not None:
-            losses, rate, generator, _ = self.state.progress
+            losses, rate, generator, _ = [*self.state.progress.losses], *self.state.progress[1:]
             torch.set_rng_state(generator)
             self.state.progress = None
         self.network.train()
@@ -169,22 +182,26 @@ class Trainer:
             skip=len(losses),
             limit=recipe.clouds_per_epoch,
             no_door_share=recipe.no_door_share,
+            part=self.ranks,
         ):
             rate = self.schedule.rate
             momentum = batchnorm_momentum(recipe, self.schedule.iteration, self.iterations_per_epoch)
             if momentum is not None:
                 set_batchnorm(self.network, momentum=momentum)
-            if time.perf_counter() - position_s > _POSITION_INTERVAL_S:
+            if self.ranks.is_first and time.perf_counter() - position_s > _POSITION_INTERVAL_S:
                 position_s = time.perf_counter()
                 self.run.write_position(self.schedule.iteration / self.iterations_per_epoch)
-            losses.append(self.train_step(self.fabric.to_device(batch)))
+            if self.fabric.device.type != "cpu" or self.ranks.size > 1:
+                # A checkpoint holds the state of one generator, that of the first rank's processor.
+                torch.manual_seed(config.torch_seed(epoch + 1, len(losses), self.ranks.rank))
+            losses.append(self.train_step(batch))
             self.schedule.step()
             if time.perf_counter() - checkpoint_s > _CHECKPOINT_INTERVAL_S:
                 checkpoint_s = time.perf_counter()
                 self._save_checkpoint(
-                    EpochProgress(losses, rate, torch.get_rng_state(), checkpoint_s - started)
+                    EpochProgress([*map(float, losses)], rate, torch.get_rng_state(), checkpoint_s - started)
                 )
-        mean = float(np.mean(losses))
+        mean = float(np.mean([*map(float, losses)]))
         if not math.isfinite(mean):
             raise RunError(
                 f"the loss is {mean} in epoch {epoch}",
@@ -212,6 +229,8 @@ class Trainer:
         return torch.stack(weighted).sum()
 
     def _save_checkpoint(self, progress: EpochProgress | None) -> None:
+        if not self.ranks.is_first:
+            return
         self.state.progress = progress
         self._checkpoint.save(self.state)
         self.state.progress = None

@@ -19,21 +19,22 @@ class TorchBackend:
     Args:
         network: classifier; is changed to evaluation mode.
         card: card of its weights.
+        device: device to run on; the network is moved there.
     """
 
     num_points = None
 
-    def __init__(self, network: PointNetwork, card: WeightsCard) -> None:
-        self.network = network.eval()
+    def __init__(self, network: PointNetwork, card: WeightsCard, device: str = "cpu") -> None:
+        self.network = network.eval().to(device)
         self.card = card
 
     def __call__(self, points: Points) -> Outputs:
         """Run the network on (B, n, 3) metres in farthest-point order."""
-        dtype = next(self.network.parameters()).dtype
+        weight = next(self.network.parameters())
         normalization = self.card.normalization
         with torch.inference_mode():
-            normalized = torch.from_numpy(normalization(points)).to(dtype)
+            normalized = torch.from_numpy(normalization(points)).to(weight.device, weight.dtype)
             outputs = head_outputs(self.network, normalized, with_points=False)
-            probabilities = (outputs.pop(STATE) / self.card.temperature).softmax(1).numpy()
-        heads = {name: values.numpy() for name, values in outputs.items()}
+            probabilities = (outputs.pop(STATE) / self.card.temperature).softmax(1).cpu().numpy()
+        heads = {name: values.cpu().numpy() for name, values in outputs.items()}
         return Outputs(probabilities, head_columns(heads, normalization.placement(points)))

@@ -13,18 +13,25 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from doorstate.networks.kernels.linear_norm_max import linear_norm_max
+from doorstate.networks.kernels.max_over_points import max_over_points
 from doorstate.networks.kernels.precision import full_precision
+from doorstate.networks.kernels.ranks import moments_over_ranks
+from doorstate.networks.layers.rank_norm import normalize_over_ranks, update_running
 
 
 class RowBatchNorm(nn.BatchNorm1d):
     """Batch normalisation of (..., C) rows over all leading axes."""
 
+    num_ranks = 1
+    """Number of processes that share the batch; each has equally many rows of it."""
     momentum: float
     running_mean: Tensor
     running_var: Tensor
     num_batches_tracked: Tensor
 
     def forward(self, rows: Tensor) -> Tensor:
+        if self.training and self.num_ranks > 1:
+            return self._normalize_over_ranks(rows)
         return super().forward(rows.reshape(-1, self.num_features)).view(rows.shape)
 
     def after_linear(self, linear: nn.Linear, rows: Tensor) -> Tensor:
@@ -45,13 +52,18 @@ class RowBatchNorm(nn.BatchNorm1d):
         Returns:
             (G, C').
         """
+        if self.num_ranks > 1:
+            outputs = functional.linear(groups, linear.weight)
+            return max_over_points(self.add_bias_and_normalize(outputs, linear.bias))
         shift = self.bias + 0 * linear.bias  # gives the bias its gradient, which is zero
         largest, mean, variance = linear_norm_max(groups, linear.weight, self.weight, shift, self.eps)
-        self._update_running(mean + linear.bias, variance, count=groups.shape[0] * groups.shape[1])
+        update_running(self, mean + linear.bias, variance, count=groups.shape[0] * groups.shape[1])
         return largest
 
     def add_bias_and_normalize(self, rows: Tensor, bias: Tensor) -> Tensor:
         """Normalise rows + bias in training; only the running mean depends on the bias, whose gradient is zero."""
+        if self.num_ranks > 1:
+            return self._normalize_over_ranks(rows, bias)
         running_mean = self.running_mean.clone()  # torch keeps it for the backward pass: it must not change
         normalized = functional.batch_norm(
             rows.reshape(-1, self.num_features),
@@ -93,18 +105,16 @@ class RowBatchNorm(nn.BatchNorm1d):
             if moments is None:
                 scale = self.weight * torch.rsqrt(self.running_var + self.eps)
                 return weight * scale.unsqueeze(1), self.bias + scale * (bias - self.running_mean)
-            mean, covariance = moments
+            mean, covariance = moments if self.num_ranks == 1 else moments_over_ranks(*moments)
             variance = ((weight @ covariance) * weight).sum(1).clamp_min(0)
-            self._update_running(weight @ mean + bias, variance, count)
+            update_running(self, weight @ mean + bias, variance, count * self.num_ranks)
             scaled = weight * (self.weight * torch.rsqrt(variance + self.eps)).unsqueeze(1)
             scaled = scaled if dtype is None else scaled.to(dtype).to(scaled.dtype)
             return scaled, self.bias - scaled @ mean + 0 * bias  # the bias cancels: its gradient is zero
 
-    @torch.no_grad()
-    def _update_running(self, mean: Tensor, variance: Tensor, count: int) -> None:
-        self.num_batches_tracked += 1
-        self.running_mean.lerp_(mean, self.momentum)
-        self.running_var.lerp_(variance * (count / (count - 1)), self.momentum)
+    def _normalize_over_ranks(self, rows: Tensor, bias: Tensor | None = None) -> Tensor:
+        flat = rows.reshape(-1, self.num_features)
+        return normalize_over_ranks(self, flat, self.num_ranks, bias).view(rows.shape)
 
 
 def set_batchnorm(network: nn.Module, eps: float | None = None, momentum: float | None = None) -> None:
