@@ -80,7 +80,7 @@ def _door_columns(row: Row, frame: Frame, openings_m: list[DepthImage]) -> dict[
         for numbers, opening_m in zip(ranges, openings_m, strict=True)
     )
     share = 0.0
-    if row.scene.items:
+    if row.scene.items or row.scene.people:
         other_openings = [door.opening for door in row.other_doors]
         view = DoorView(row.scene, row.opening(), row.camera_pose(), row.camera, other_openings)
         share = view.occluded_share(clutter_boxes(row.scene))

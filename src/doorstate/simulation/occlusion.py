@@ -38,7 +38,7 @@ class DoorView:
         height = round(_COLUMNS * camera.height / camera.width)
         size = {"width": _COLUMNS, "height": height, "cx_px": None, "cy_px": None}
         self._pose, self._intrinsics = pose, camera.model_copy(update=size).intrinsics()
-        uncluttered = scene.model_copy(update={"items": ()})
+        uncluttered = scene.without_clutter()
         groups = box_groups(uncluttered, opening, other_openings)
         rendered = render_behind_glass(groups.all(), pose, self._intrinsics)
         width_m, height_m = scene.door.opening_width_m, scene.door.opening_height_m

@@ -106,7 +106,7 @@ def draw_rows(preset: Preset, seed: int, index: int) -> list[Row]:
         pose_id=pose_id,
         scene_id=pose_id if preset.has_many_scenes else "",
         state=NO_DOOR,
-        scene_kind=scene.feature.kind if scene.feature else "door",
+        scene_kind=scene.kind,
         x_m=view.x_m,
         y_m=view.y_m,
         camera_height_m=view.camera_height_m,

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from doorstate.io.camera import Intrinsics
 from doorstate.simulation.box_faces import place_boxes
 from doorstate.simulation.camera import CameraPose, DepthCamera
+from doorstate.simulation.cast_capsule import capsule_numbers, cast_capsule
 from doorstate.simulation.scene.box import Box, Material
 from doorstate.simulation.z_buffer import NOTHING, ZBuffer, box_of, ray_slopes
 from doorstate.types import DepthImage, Part
@@ -38,7 +39,7 @@ def render(boxes: Sequence[Box], pose: CameraPose, intrinsics: Intrinsics) -> Re
         Depth (H, W) float32 in metres, part (H, W) uint8 and box (H, W) int16.
     """
     buffer = ZBuffer(place_boxes(boxes, pose), intrinsics)
-    buffer.draw_boxes(range(len(boxes)))
+    _draw(buffer, boxes, range(len(boxes)), intrinsics)
     return _rendered(buffer, boxes)
 
 
@@ -60,14 +61,14 @@ def render_states(states: Sequence[Sequence[Box]], pose: CameraPose, intrinsics:
     shared = [len({(type(box), box) for box in versions}) == 1 for versions in zip(*states, strict=True)]
     opaque = [box.material != "glass" for box in states[0]]
     background = ZBuffer(place_boxes(states[0], pose), intrinsics)
-    background.draw_boxes(np.flatnonzero(np.logical_and(shared, opaque)).tolist())
+    _draw(background, states[0], np.flatnonzero(np.logical_and(shared, opaque)).tolist(), intrinsics)
     own = np.flatnonzero(np.logical_and(np.logical_not(shared), opaque)).tolist()
     panes = np.flatnonzero(np.logical_not(opaque)).tolist()
     renders = []
     for boxes in states:
         buffer = background.copy()
         buffer.placed = place_boxes(boxes, pose)
-        buffer.draw_boxes(own)
+        _draw(buffer, boxes, own, intrinsics)
         rendered = _rendered(buffer, boxes)
         if panes:
             behind = buffer.face.copy()
@@ -75,6 +76,14 @@ def render_states(states: Sequence[Sequence[Box]], pose: CameraPose, intrinsics:
             rendered = rendered._replace(pane=behind != buffer.face)
         renders.append(rendered)
     return renders
+
+
+def _draw(buffer: ZBuffer, boxes: Sequence[Box], numbers: Sequence[int], intrinsics: Intrinsics) -> None:
+    capsules = capsule_numbers(boxes, numbers)
+    buffer.draw_boxes(number for number in numbers if number not in capsules)
+    for number in capsules:
+        hits = cast_capsule(buffer.placed, number, intrinsics)
+        buffer.draw(number, hits.rows, hits.columns, hits.depth_m)
 
 
 def _rendered(buffer: ZBuffer, boxes: Sequence[Box]) -> Render:
@@ -101,7 +110,8 @@ def incidence(
     assert rendered.face is not None
     # Rows of codes: one for each axis of a box, and one that is left out. NOTHING is -1 and so indexes the last row.
     normals = np.zeros((len(boxes) + 1, 4, 3))
-    normals[:-1, :3] = place_boxes(boxes, pose).rotation
+    placed = place_boxes(boxes, pose)
+    normals[:-1, :3] = placed.rotation
     forward, to_left, to_up = normals.reshape(-1, 3).T.copy()
     face = rendered.face.astype(np.intp)
     left, up = ray_slopes(intrinsics)
@@ -111,6 +121,10 @@ def incidence(
     rise = to_up.take(face, mode="wrap")
     rise *= up
     cosine += rise
+    for number in capsule_numbers(boxes, range(len(boxes))):
+        hits = cast_capsule(placed, number, intrinsics)
+        seen = box_of(rendered.face[hits.rows, hits.columns]) == number
+        np.copyto(cosine[hits.rows, hits.columns], hits.slope, where=seen)
     np.abs(cosine, out=cosine)
     cosine /= np.sqrt(1 + left * left + up * up)
     angle = np.arccos(cosine, out=cosine).astype(np.float32)

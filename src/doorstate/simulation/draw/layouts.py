@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from doorstate.simulation.draw.rooms import BESIDE_M, draw_far
 from doorstate.simulation.draw.stream import Stream
+from doorstate.simulation.draw.viewpoints import Viewpoint
 from doorstate.simulation.scene.box import Pose
 from doorstate.simulation.scene.door import Door
 from doorstate.simulation.scene.placed_door import PlacedDoor, WallName
@@ -77,22 +78,59 @@ class Layout(NamedTuple):
     def scene(self, main: int) -> Scene:
         """Return the scene in the frame of one door."""
         door = self.doors[main]
-        length = self.wall_length_m(door.wall)
-        # Coordinate along each wall, by its role, that has zero where the main door's frame has.
-        zero_m = (door.along_m, 0.0, length - door.along_m, self.wall_length_m(door.wall + 1))
         others = []
         for number, other in enumerate(self.doors):
             if number != main:
-                role = (other.wall - door.wall) % 4
-                along_m = round(other.along_m - zero_m[role], 4)
-                others.append(PlacedDoor(door=other.door, wall=_ROLES[role], along_m=along_m, far=other.far))
-        left, opposite, right = (self.has_wall[(door.wall + turn) % 4] for turn in (1, 2, 3))
-        near = Space(
-            left_m=round(length - door.along_m, 4) if left else None,
-            right_m=round(door.along_m, 4) if right else None,
-            depth_m=round(self.wall_length_m(door.wall + 1), 4) if opposite else None,
-        )
+                wall, along_m = self.seen_from(door.wall, door.along_m, other.wall, other.along_m)
+                others.append(PlacedDoor(door=other.door, wall=wall, along_m=along_m, far=other.far))
+        near = self.near(door.wall, door.along_m)
         return Scene(door=door.door, near=near, far=door.far, other_doors=tuple(others))
+
+    def near(self, wall: int, along_m: float) -> Space:
+        """Return the room as seen from a place on a wall."""
+        length = self.wall_length_m(wall)
+        left, opposite, right = (self.has_wall[(wall + turn) % 4] for turn in (1, 2, 3))
+        return Space(
+            left_m=round(length - along_m, 4) if left else None,
+            right_m=round(along_m, 4) if right else None,
+            depth_m=round(self.wall_length_m(wall + 1), 4) if opposite else None,
+        )
+
+    def seen_from(
+        self, wall: int, along_m: float, other_wall: int, other_along_m: float
+    ) -> tuple[WallName, float]:
+        """Return wall and coordinate along it of another place, in the frame of a place on a wall."""
+        # Coordinate along each wall, by its role, that has zero where the frame has.
+        zero_m = (along_m, 0.0, self.wall_length_m(wall) - along_m, self.wall_length_m(wall + 1))
+        role = (other_wall - wall) % 4
+        return _ROLES[role], round(other_along_m - zero_m[role], 4)
+
+
+class PlacedCamera(NamedTuple):
+    """A camera in a layout."""
+
+    pose: Pose
+    height_m: float
+    pitch_deg: float
+    roll_deg: float
+
+    def viewpoint(self, frame: Pose) -> Viewpoint:
+        """Return the camera in the frame of a door."""
+        x, y, yaw = frame.inverse().after(self.pose)
+        heading = math.degrees(math.remainder(yaw, 2 * math.pi))
+        robot_angle = math.degrees(math.atan2(y, x))
+        return Viewpoint(
+            x_m=x,
+            y_m=y,
+            camera_height_m=self.height_m,
+            heading_deg=heading,
+            heading_rad=math.radians(heading),
+            heading_offset_deg=math.remainder(heading - robot_angle - 180, 360),
+            pitch_deg=self.pitch_deg,
+            roll_deg=self.roll_deg,
+            distance_m=math.hypot(x, y),
+            robot_angle_deg=robot_angle,
+        )
 
 
 def draw_far_spaces(stream: Stream, layout: Layout) -> Layout:

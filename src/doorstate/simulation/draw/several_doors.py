@@ -5,12 +5,11 @@ from __future__ import annotations
 
 import math
 from itertools import chain, permutations
-from typing import NamedTuple
 
 from doorstate.doorways.remoteness import remoteness_m
 from doorstate.simulation.camera import DepthCamera
 from doorstate.simulation.draw.doors import WALL_HEIGHT_M, WALL_THICKNESS_M, draw_door
-from doorstate.simulation.draw.layouts import Layout, WallDoor, draw_far_spaces
+from doorstate.simulation.draw.layouts import Layout, PlacedCamera, WallDoor, draw_far_spaces
 from doorstate.simulation.draw.openings import draw_openings
 from doorstate.simulation.draw.scenes import (
     FEW_ITEMS,
@@ -43,33 +42,6 @@ _SMALL = DepthCamera(width=160, height=120)
 _PIXELS_PER_SMALL_PIXEL = 16
 _WALL_HALF_LENGTH_M = 8.0  # as long as the floor
 _DOOR_TRIES = 20
-
-
-class _Camera(NamedTuple):
-    """A camera in a layout."""
-
-    pose: Pose
-    height_m: float
-    pitch_deg: float
-    roll_deg: float
-
-    def viewpoint(self, frame: Pose) -> Viewpoint:
-        """Return the camera in the frame of a door."""
-        x, y, yaw = frame.inverse().after(self.pose)
-        heading = math.degrees(math.remainder(yaw, 2 * math.pi))
-        robot_angle = math.degrees(math.atan2(y, x))
-        return Viewpoint(
-            x_m=x,
-            y_m=y,
-            camera_height_m=self.height_m,
-            heading_deg=heading,
-            heading_rad=math.radians(heading),
-            heading_offset_deg=math.remainder(heading - robot_angle - 180, 360),
-            pitch_deg=self.pitch_deg,
-            roll_deg=self.roll_deg,
-            distance_m=math.hypot(x, y),
-            robot_angle_deg=robot_angle,
-        )
 
 
 def draw_corridor(stream: Stream) -> DrawnScene:
@@ -146,11 +118,11 @@ def _with_door(
     return layout
 
 
-def _draw_camera(stream: Stream, pose: Pose) -> _Camera:
-    return _Camera(pose, stream.uniform(0.25, 1.8), stream.uniform(-10, 10), stream.uniform(-2, 2))
+def _draw_camera(stream: Stream, pose: Pose) -> PlacedCamera:
+    return PlacedCamera(pose, stream.uniform(0.25, 1.8), stream.uniform(-10, 10), stream.uniform(-2, 2))
 
 
-def _draw_view(stream: Stream, layout: Layout, camera: _Camera) -> DrawnScene | None:
+def _draw_view(stream: Stream, layout: Layout, camera: PlacedCamera) -> DrawnScene | None:
     """Choose the main door, and draw openings and clutter.
 
     Returns:
@@ -189,7 +161,7 @@ def _draw_view(stream: Stream, layout: Layout, camera: _Camera) -> DrawnScene | 
     return DrawnScene(scene, viewpoint, list(mains), other_openings=others_of)
 
 
-def _most_in_front(layout: Layout, camera: _Camera) -> int | None:
+def _most_in_front(layout: Layout, camera: PlacedCamera) -> int | None:
     """Return the number of the door most in front of those in view; None if fewer than two are in view."""
     remoteness = {}
     in_view = _are_in_view(layout.scene(0), camera.viewpoint(layout.door_frame(0)))

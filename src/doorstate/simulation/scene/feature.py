@@ -3,12 +3,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Literal, get_args
 
 from pydantic import Field
 
 from doorstate._models import FrozenModel, Metres
 from doorstate.simulation.scene.box import Box
+from doorstate.simulation.scene.cupboard import cupboard_boxes
+from doorstate.simulation.scene.wall import Gap, wall_boxes
+from doorstate.simulation.scene.window import sash_boxes
 from doorstate.types import Part
 
 FeatureKind = Literal["wall", "inner_corner", "outer_corner", "cupboard", "window", "niche", "passage"]
@@ -16,8 +20,6 @@ FEATURES: tuple[FeatureKind, ...] = get_args(FeatureKind)
 
 _LONG_M = 6.0
 _BACK_M = 0.1
-_FRONT_M, _GAP_M, _PLINTH_M, _KNOB_M = 0.018, 0.003, 0.08, 0.025
-_CASEMENT_M, _PANE_M = 0.06, 0.02
 
 
 class Feature(FrozenModel):
@@ -35,15 +37,21 @@ class Feature(FrozenModel):
     corner_m: Metres = 0.0  # x of the corner
 
 
-def feature_boxes(feature: Feature) -> list[Box]:
-    """Return the wall and the object in or before it, in the door frame."""
+def feature_boxes(feature: Feature, gaps: Sequence[Gap] = ()) -> list[Box]:
+    """Return the wall and the object in or before it, in the door frame; a plain wall may have gaps."""
     match feature.kind:
         case "inner_corner" | "outer_corner":
             return _corner(feature)
         case "cupboard":
-            return [*_pierced(feature, feature.wall_thickness_m, 0.0), *_cupboard(feature)]
+            cupboard = cupboard_boxes(feature.width_m, feature.depth_m, feature.top_m, feature.fronts)
+            return [*_pierced(feature, feature.wall_thickness_m, 0.0), *cupboard]
         case "window":
-            return [*_pierced(feature, feature.wall_thickness_m, feature.width_m), *_window(feature)]
+            y = -feature.wall_thickness_m / 2
+            sash = sash_boxes(feature.width_m, feature.bottom_m, feature.top_m, y)
+            return [*_pierced(feature, feature.wall_thickness_m, feature.width_m), *sash]
+        case "wall" if gaps:
+            ends_m = (-_LONG_M, _LONG_M)
+            return wall_boxes(ends_m, feature.wall_thickness_m, feature.wall_height_m, gaps)
         case "niche":
             back = (2 * _LONG_M, _BACK_M, feature.wall_height_m)
             center = (0.0, -feature.depth_m - _BACK_M / 2, feature.wall_height_m / 2)
@@ -83,38 +91,3 @@ def _corner(feature: Feature) -> list[Box]:
         wall,
         Box(Part.WALL, (x, y, height / 2), (thickness, _LONG_M + (thickness if inner else 0), height)),
     ]
-
-
-def _cupboard(feature: Feature) -> list[Box]:
-    """Return a carcass on a plinth with one or two closed fronts, and a knob on each."""
-    width, depth, top = feature.width_m, feature.depth_m, feature.top_m
-    body = depth - _FRONT_M
-    middle = (_PLINTH_M + top) / 2
-    boxes = [
-        Box(Part.OTHER, (0.0, (body - 0.05) / 2, _PLINTH_M / 2), (width - 0.02, body - 0.05, _PLINTH_M)),
-        Box(Part.OTHER, (0.0, body / 2, middle), (width, body, top - _PLINTH_M)),
-    ]
-    front = width / feature.fronts
-    for number in range(feature.fronts):
-        x = (number + 0.5) * front - width / 2
-        size = (front - _GAP_M, _FRONT_M, top - _PLINTH_M - _GAP_M)
-        boxes.append(Box(Part.OTHER, (x, body + _FRONT_M / 2, middle), size))
-        towards_middle = -1.0 if x > 0 else 1.0
-        knob_x = x + towards_middle * (front / 2 - 0.05)
-        boxes.append(Box(Part.OTHER, (knob_x, depth + _KNOB_M / 2, 1.0), (_KNOB_M, _KNOB_M, _KNOB_M)))
-    return boxes
-
-
-def _window(feature: Feature) -> list[Box]:
-    """Return a casement around a pane, in the middle of the wall's thickness."""
-    width, low, high = feature.width_m, feature.bottom_m, feature.top_m
-    y, z, bar = -feature.wall_thickness_m / 2, (low + high) / 2, _CASEMENT_M
-    inner = width - 2 * bar
-    posts = [
-        Box(Part.OTHER, (x, y, z), (bar, bar, high - low)) for x in ((bar - width) / 2, (width - bar) / 2)
-    ]
-    rails = [
-        Box(Part.OTHER, (0.0, y, rail_z), (inner, bar, bar)) for rail_z in (low + bar / 2, high - bar / 2)
-    ]
-    pane = Box(Part.OTHER, (0.0, y, z), (inner, _PANE_M, high - low - 2 * bar), material="glass")
-    return [*posts, *rails, pane]

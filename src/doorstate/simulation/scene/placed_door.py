@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from doorstate._models import FrozenModel, Metres
 from doorstate.simulation.scene.box import Box, Pose
@@ -72,8 +72,18 @@ def placed_door_boxes(placed: PlacedDoor, opening: Opening, near: Space) -> list
     return placed.pose(near).place(frame_and_leaf_boxes(placed.door, opening))
 
 
-def pierced_walls(doors: Sequence[PlacedDoor], near: Space) -> list[Box]:
-    """Return the walls with doors, without that of the main door, and the spaces behind all doors."""
+class WallGap(NamedTuple):
+    """A gap without a door in a wall."""
+
+    wall: WallName
+    wall_thickness_m: float
+    gap: Gap
+
+
+def pierced_walls(
+    doors: Sequence[PlacedDoor], near: Space, height_m: float, more: Sequence[WallGap] = ()
+) -> list[Box]:
+    """Return the walls with gaps, without that of the main door, and the spaces behind all doors."""
     boxes = []
     depth, left, right = near.depth_m or LONG_M, near.left_m or LONG_M, near.right_m or LONG_M
     ends: dict[WallName, tuple[float, float]] = {
@@ -82,11 +92,11 @@ def pierced_walls(doors: Sequence[PlacedDoor], near: Space) -> list[Box]:
         "right": (-depth, 0.0),
     }
     for wall, ends_m in ends.items():
-        gaps = neighbours(doors, wall)
+        gaps = [*neighbours(doors, wall), *(other.gap for other in more if other.wall == wall)]
         if gaps:
-            door = next(placed.door for placed in doors if placed.wall == wall)
-            pierced = wall_boxes(ends_m, door.wall_thickness_m, door.wall_height_m, gaps)
-            boxes += wall_pose(wall, near).place(pierced)
+            thicknesses_m = [placed.door.wall_thickness_m for placed in doors if placed.wall == wall]
+            thicknesses_m += [other.wall_thickness_m for other in more if other.wall == wall]
+            boxes += wall_pose(wall, near).place(wall_boxes(ends_m, thicknesses_m[0], height_m, gaps))
     for placed in doors:
         far = space_boxes(placed.far, -placed.door.wall_thickness_m, -1, placed.door.wall_height_m)
         boxes += placed.pose(near).place(far)

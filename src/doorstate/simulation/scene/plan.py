@@ -19,8 +19,15 @@ def collide(boxes: Sequence[Box], obstacles: Sequence[Box], tolerance_m: float =
 
     Separating axis test in plan, and the overlap in height.
     """
+    return bool(colliding(boxes, obstacles, tolerance_m).any())
+
+
+def colliding(
+    boxes: Sequence[Box], obstacles: Sequence[Box], tolerance_m: float = TOLERANCE_M
+) -> NDArray[np.bool_]:
+    """Return for each box True if it overlaps an obstacle by more than the tolerance; as `collide`."""
     if not boxes or not obstacles:
-        return False
+        return np.zeros(len(boxes), dtype=bool)
     center, axes, half = _plans(boxes, 1)
     obstacle_center, obstacle_axes, obstacle_half = _plans(obstacles, 0)
     apart = obstacle_center - center  # (N, M, 3)
@@ -34,7 +41,8 @@ def collide(boxes: Sequence[Box], obstacles: Sequence[Box], tolerance_m: float =
         away = np.abs(np.einsum("...ix,...x->...i", own_axes, apart[..., :2]))
         reach = own[..., :2] + np.einsum("...ij,...j->...i", rotated, opposite[..., :2])
         separated |= (away > reach - tolerance_m).any(axis=-1)
-    return bool((~separated).any())
+    hits: NDArray[np.bool_] = np.logical_not(separated).any(axis=1)
+    return hits
 
 
 def distance_m(box: Box, target: Box) -> float:

@@ -9,8 +9,8 @@ from doorstate._models import FrozenModel, Metres
 from doorstate.simulation.scene.box import Box
 from doorstate.types import Part
 
-_WALL_M = 0.1
-_FLOOR_M = 0.1
+WALL_M = 0.1
+FLOOR_M = 0.1
 LONG_M = 8.0  # length of walls without an end: beyond the camera's range
 
 
@@ -20,6 +20,10 @@ class Space(FrozenModel):
     left_m: Metres | None = None
     right_m: Metres | None = None
     depth_m: Metres | None = None
+    is_outdoors: bool | None = None  # nothing within a camera's range, without floor
+
+
+OUTDOORS = Space(is_outdoors=True)
 
 
 def space_boxes(
@@ -39,20 +43,20 @@ def space_boxes(
     middle_y, z = wall_y_m + side * depth / 2, height_m / 2
     boxes = []
     if space.left_m and "left" not in without:
-        boxes.append(Box(Part.WALL, (left + _WALL_M / 2, middle_y, z), (_WALL_M, depth, height_m)))
+        boxes.append(Box(Part.WALL, (left + WALL_M / 2, middle_y, z), (WALL_M, depth, height_m)))
     if space.right_m and "right" not in without:
-        boxes.append(Box(Part.WALL, (-right - _WALL_M / 2, middle_y, z), (_WALL_M, depth, height_m)))
+        boxes.append(Box(Part.WALL, (-right - WALL_M / 2, middle_y, z), (WALL_M, depth, height_m)))
     if space.depth_m and "opposite" not in without:
-        y = wall_y_m + side * (depth + _WALL_M / 2)
-        boxes.append(Box(Part.WALL, ((left - right) / 2, y, z), (left + right, _WALL_M, height_m)))
+        y = wall_y_m + side * (depth + WALL_M / 2)
+        boxes.append(Box(Part.WALL, ((left - right) / 2, y, z), (left + right, WALL_M, height_m)))
     return boxes
 
 
 def floor_box(size_m: float) -> Box:
     """Return a square floor."""
-    return Box(Part.FLOOR, (0.0, 0.0, -_FLOOR_M / 2), (size_m, size_m, _FLOOR_M))
+    return Box(Part.FLOOR, (0.0, 0.0, -FLOOR_M / 2), (size_m, size_m, FLOOR_M))
 
 
 def ceiling_box(height_m: float, size_m: float) -> Box:
     """Return a square ceiling over both spaces."""
-    return Box(Part.CEILING, (0.0, 0.0, height_m + _WALL_M / 2), (size_m, size_m, _WALL_M))
+    return Box(Part.CEILING, (0.0, 0.0, height_m + WALL_M / 2), (size_m, size_m, WALL_M))

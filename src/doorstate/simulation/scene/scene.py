@@ -1,31 +1,43 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A whole scene: a wall with a door or another feature, the spaces on both sides, and clutter."""
+"""A whole scene: a wall with a door or another feature, the spaces on both sides, and what stands in them."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import chain
-from typing import NamedTuple, Self
+from typing import Literal, NamedTuple, Self
 
 from pydantic import Field, model_validator
 
 from doorstate._models import FrozenModel
+from doorstate.simulation.scene.aperture import Aperture, ApertureKind, aperture_boxes
 from doorstate.simulation.scene.box import Box, Pose
 from doorstate.simulation.scene.clutter import Item, item_boxes
 from doorstate.simulation.scene.door import Door, Opening
 from doorstate.simulation.scene.door_boxes import door_boxes
-from doorstate.simulation.scene.feature import Feature, feature_boxes
+from doorstate.simulation.scene.feature import Feature, FeatureKind, feature_boxes
+from doorstate.simulation.scene.fixture import Fixture, FixtureKind, fixture_boxes
+from doorstate.simulation.scene.floors import floor_boxes
+from doorstate.simulation.scene.person import Person, person_boxes
 from doorstate.simulation.scene.placed_door import (
     PlacedDoor,
+    WallGap,
     neighbours,
     pierced_walls,
     placed_door_boxes,
 )
 from doorstate.simulation.scene.room import Space, ceiling_box, floor_box, space_boxes
+from doorstate.simulation.scene.stairs import Stairs, stairs_boxes
+from doorstate.simulation.scene.wall import Gap
+
+LayoutKind = Literal["corridor", "room", "junction", "lobby", "stairwell"]
+SceneKind = Literal["door"] | FeatureKind | FixtureKind | ApertureKind
 
 
 class Scene(FrozenModel):
     """Everything in front of the camera except how far the door is open.
+
+    A building has a `layout`, and its floors and ceilings end with its spaces; elsewhere they are one square.
 
     Raises:
         ValueError: both a door and a feature, or neither.
@@ -38,6 +50,12 @@ class Scene(FrozenModel):
     has_ceiling: bool = True
     items: tuple[Item, ...] = Field(default=(), max_length=200)
     other_doors: tuple[PlacedDoor, ...] | None = Field(default=None, max_length=20)
+    layout: LayoutKind | None = None
+    shows: FixtureKind | ApertureKind | None = None  # what a view without a door is about
+    apertures: tuple[Aperture, ...] | None = Field(default=None, max_length=20)
+    fixtures: tuple[Fixture, ...] | None = Field(default=None, max_length=200)
+    stairs: tuple[Stairs, ...] | None = Field(default=None, max_length=10)
+    people: tuple[Person, ...] | None = Field(default=None, max_length=20)
 
     @model_validator(mode="after")
     def _check_door_or_feature(self) -> Self:
@@ -48,17 +66,20 @@ class Scene(FrozenModel):
         return self
 
     @model_validator(mode="after")
-    def _check_other_doors(self) -> Self:
+    def _check_walls(self) -> Self:
         thickness_m: dict[str, float] = {"main": self.wall.wall_thickness_m}
         for placed in self.other_doors or ():
             if self.door is None:
                 raise ValueError("further doors need a main door")
-            placed.pose(self.near)
-            door = placed.door
-            if door.wall_height_m != self.door.wall_height_m:
+            if placed.door.wall_height_m != self.door.wall_height_m:
                 raise ValueError("walls of one room have the same height")
-            if door.wall_thickness_m != thickness_m.setdefault(placed.wall, door.wall_thickness_m):
-                raise ValueError("doors of one wall have walls of the same thickness")
+        gaps: list[tuple[PlacedDoor | Aperture, float]] = []
+        gaps += [(placed, placed.door.wall_thickness_m) for placed in self.other_doors or ()]
+        gaps += [(aperture, aperture.wall_thickness_m) for aperture in self.apertures or ()]
+        for gap, wall_m in gaps:
+            gap.pose(self.near)
+            if wall_m != thickness_m.setdefault(gap.wall, wall_m):
+                raise ValueError("doors and apertures of one wall have walls of the same thickness")
         return self
 
     @property
@@ -67,6 +88,20 @@ class Scene(FrozenModel):
         subject = self.door or self.feature
         assert subject is not None
         return subject
+
+    @property
+    def kind(self) -> SceneKind:
+        """Return `door`, or what a view without a door is about."""
+        return "door" if self.feature is None else self.shows or self.feature.kind
+
+    def main_gaps(self) -> list[Gap]:
+        """Return the gaps in the wall of the main door or feature, without that door's own."""
+        gaps = neighbours(self.other_doors or ())
+        return gaps + [aperture.gap for aperture in self.apertures or () if aperture.wall == "main"]
+
+    def without_clutter(self) -> Self:
+        """Return the scene without items and people."""
+        return self.model_copy(update={"items": (), "people": None})
 
 
 class BoxGroups(NamedTuple):
@@ -101,10 +136,10 @@ def box_groups(scene: Scene, opening: Opening, other_openings: Sequence[Opening]
     """
     others = scene.other_doors or ()
     if scene.door:
-        main = door_boxes(scene.door, opening, neighbours(others))
+        main = door_boxes(scene.door, opening, scene.main_gaps())
     else:
         assert scene.feature is not None
-        main = feature_boxes(scene.feature)
+        main = feature_boxes(scene.feature, scene.main_gaps())
     other_boxes = [
         placed_door_boxes(placed, own, scene.near) for placed, own in zip(others, other_openings, strict=True)
     ]
@@ -122,18 +157,43 @@ def scene_boxes(scene: Scene, opening: Opening, other_openings: Sequence[Opening
 
 
 def room_boxes(scene: Scene) -> list[Box]:
-    """Return floor, ceiling and the walls of the spaces on both sides, with gaps for other doors."""
-    wall, others = scene.wall, scene.other_doors or ()
+    """Return floor, ceiling, the walls of all spaces with gaps for doors, and what is fastened to them."""
+    wall, others, apertures = scene.wall, scene.other_doors or (), scene.apertures or ()
     height = wall.wall_height_m
+    gaps = [WallGap(aperture.wall, aperture.wall_thickness_m, aperture.gap) for aperture in apertures]
+    pierced = {*(placed.wall for placed in others), *(aperture.wall for aperture in apertures)}
     return [
-        floor_box(wall.floor_size_m),
-        *([ceiling_box(height, wall.floor_size_m)] if scene.has_ceiling else []),
-        *space_boxes(scene.near, 0.0, 1, height, without={placed.wall for placed in others}),
+        *_floors_and_ceilings(scene),
+        *space_boxes(scene.near, 0.0, 1, height, without=pierced),
         *space_boxes(scene.far, -wall.wall_thickness_m, -1, height),
-        *pierced_walls(others, scene.near),
+        *pierced_walls(others, scene.near, height, gaps),
+        *chain.from_iterable(aperture_boxes(aperture, scene.near, height) for aperture in apertures),
+        *chain.from_iterable(map(stairs_boxes, scene.stairs or ())),
+        *chain.from_iterable(map(fixture_boxes, scene.fixtures or ())),
     ]
 
 
 def clutter_boxes(scene: Scene) -> list[Box]:
-    """Return the boxes of all items."""
-    return [box for item in scene.items for box in item_boxes(item)]
+    """Return the boxes of all items and people."""
+    return [
+        *chain.from_iterable(map(item_boxes, scene.items)),
+        *chain.from_iterable(map(person_boxes, scene.people or ())),
+    ]
+
+
+def _floors_and_ceilings(scene: Scene) -> list[Box]:
+    wall = scene.wall
+    if scene.layout is None:
+        ceiling = [ceiling_box(wall.wall_height_m, wall.floor_size_m)] if scene.has_ceiling else []
+        return [floor_box(wall.floor_size_m), *ceiling]
+    behind = [(Pose(0.0, 0.0, 0.0), scene.far, wall.wall_thickness_m)]
+    behind += [
+        (placed.pose(scene.near), placed.far, placed.door.wall_thickness_m)
+        for placed in scene.other_doors or ()
+    ]
+    behind += [
+        (aperture.pose(scene.near), aperture.beyond, aperture.wall_thickness_m)
+        for aperture in scene.apertures or ()
+    ]
+    holes = [stairs.outline() for stairs in scene.stairs or () if stairs.rise_m < 0]
+    return floor_boxes(scene.near, behind, holes, wall.wall_height_m if scene.has_ceiling else None)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Straight walls with gaps for doors."""
+"""Straight walls with gaps for doors and other openings."""
 
 from __future__ import annotations
 
@@ -12,11 +12,12 @@ from doorstate.types import Part
 
 
 class Gap(NamedTuple):
-    """A gap in a wall, from the floor up to its top."""
+    """A gap in a wall."""
 
     x_m: float  # of its middle
     half_width_m: float
     top_m: float
+    bottom_m: float = 0.0
 
 
 def door_gap(door: Door, x_m: float = 0.0) -> Gap:
@@ -28,7 +29,7 @@ def door_gap(door: Door, x_m: float = 0.0) -> Gap:
 def wall_boxes(
     ends_m: tuple[float, float], thickness_m: float, height_m: float, gaps: Sequence[Gap]
 ) -> list[Box]:
-    """Return a wall along x whose face is y = 0: the stretches beside its gaps from +x to -x, then the lintels."""
+    """Return a wall along x whose face is y = 0: the stretches beside its gaps from +x to -x, lintels, sills."""
     y = -thickness_m / 2
     boxes = []
     ordered = sorted(gaps, key=lambda gap: -gap.x_m)
@@ -44,4 +45,8 @@ def wall_boxes(
         if height_m > gap.top_m:
             size = (2 * gap.half_width_m, thickness_m, height_m - gap.top_m)
             boxes.append(Box(Part.WALL, (gap.x_m, y, (gap.top_m + height_m) / 2), size))
+    for gap in ordered:
+        if gap.bottom_m > 0:
+            size = (2 * gap.half_width_m, thickness_m, gap.bottom_m)
+            boxes.append(Box(Part.WALL, (gap.x_m, y, gap.bottom_m / 2), size))
     return boxes
