@@ -9,6 +9,7 @@ from typing import Literal
 
 from doorstate._models import FrozenModel
 from doorstate.simulation.camera import DepthCamera
+from doorstate.simulation.draw.building.scene import draw_building, draw_building_no_door
 from doorstate.simulation.draw.half_ring import half_ring, reduced_ring
 from doorstate.simulation.draw.paper import FIXED_ANGLES_DEG, draw_paper_scene
 from doorstate.simulation.draw.scenes import (
@@ -39,6 +40,8 @@ PresetName = Literal[
     "no-door",
     "corridor",
     "two-doors",
+    "building",
+    "building-no-door",
 ]
 DEFAULT_SCENES = 1000
 
@@ -56,6 +59,8 @@ _SCENE_DRAWS: dict[PresetName, Callable[[Stream], DrawnScene]] = {
     "no-door": draw_no_door,
     "corridor": draw_corridor,
     "two-doors": draw_two_doors,
+    "building": draw_building,
+    "building-no-door": draw_building_no_door,
 }
 
 

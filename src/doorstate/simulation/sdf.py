@@ -1,18 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Export of a manifest row as an SDF world for Gazebo (SDFormat 1.7): the scene's boxes and the depth camera.
+"""Export of a manifest row as an SDF world for Gazebo (SDFormat 1.7): the scene's shapes and the depth camera.
 
-The world frame is the door frame.
+The world frame is the door frame. SDFormat has capsules from 1.8 on; here each is a cylinder and two spheres.
 """
 
 from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
+from collections.abc import Mapping
 
 from doorstate.errors import ConfigError
 from doorstate.simulation.camera import CameraPose, DepthCamera
 from doorstate.simulation.row import Row
 from doorstate.simulation.scene.box import Box
+from doorstate.simulation.scene.capsule import Capsule
 from doorstate.simulation.shading import COLORS
 
 _FAR_M = 20.0  # beyond every camera's range: Gazebo reports clipped depth as infinite
@@ -39,18 +41,40 @@ def sdf_world(row: Row, name: str) -> str:
     _leaf(model, "static", "true")
     link = ET.SubElement(model, "link", name="boxes")
     for number, box in enumerate(row.boxes()):
-        _add_box(link, f"{number:03d}_{box.part.name.lower()}", box)
+        name = f"{number:03d}_{box.part.name.lower()}"
+        if isinstance(box, Capsule):
+            _add_capsule(link, name, box)
+        else:
+            _add_shape(link, name, box, box.center_m, "box", {"size": _numbers(*box.size_m)})
     _add_camera(world, row.camera_pose(), row.camera)
     ET.indent(sdf)
     return ET.tostring(sdf, encoding="unicode", xml_declaration=True) + "\n"
 
 
-def _add_box(link: ET.Element, name: str, box: Box) -> None:
+def _add_capsule(link: ET.Element, name: str, capsule: Capsule) -> None:
+    (x, y, z), (width, _, height) = capsule.center_m, capsule.size_m
+    radius, reach = width / 2, (height - width) / 2
+    if reach > 0:
+        sizes = {"radius": _numbers(radius), "length": _numbers(2 * reach)}
+        _add_shape(link, f"{name}_cylinder", capsule, (x, y, z), "cylinder", sizes)
+    for end, at in (("top", z + reach), ("bottom", z - reach)):
+        _add_shape(link, f"{name}_{end}", capsule, (x, y, at), "sphere", {"radius": _numbers(radius)})
+
+
+def _add_shape(
+    link: ET.Element,
+    name: str,
+    box: Box,
+    center_m: tuple[float, float, float],
+    shape: str,
+    sizes: Mapping[str, str],
+) -> None:
     for kind in ("visual", "collision"):
         element = ET.SubElement(link, kind, name=name)
-        _leaf(element, "pose", _numbers(*box.center_m, 0.0, 0.0, box.yaw_rad))
-        geometry = ET.SubElement(ET.SubElement(element, "geometry"), "box")
-        _leaf(geometry, "size", _numbers(*box.size_m))
+        _leaf(element, "pose", _numbers(*center_m, 0.0, 0.0, box.yaw_rad))
+        geometry = ET.SubElement(ET.SubElement(element, "geometry"), shape)
+        for tag, text in sizes.items():
+            _leaf(geometry, tag, text)
         if kind == "visual":
             material = ET.SubElement(element, "material")
             color = _numbers(*(round(level / 255, 3) for level in COLORS[box.part]), 1.0)

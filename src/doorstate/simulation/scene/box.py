@@ -53,7 +53,8 @@ def place(boxes: Sequence[Box], x_m: float, y_m: float, yaw_rad: float) -> list[
     for box in boxes:
         x, y, z = box.center_m
         center = (x_m + x * cos - y * sin, y_m + x * sin + y * cos, z)
-        placed.append(box._replace(center_m=center, yaw_rad=box.yaw_rad + yaw_rad))
+        # The constructor of its own class takes a third of the time of `_replace`.
+        placed.append(type(box)(box.part, center, box.size_m, box.yaw_rad + yaw_rad, box.material))
     return placed
 
 
@@ -62,13 +63,16 @@ def mirror(boxes: Sequence[Box], x: bool = False, about_y_m: float | None = None
     sign_x, sign_y = (-1.0 if x else 1.0), (1.0 if about_y_m is None else -1.0)
     axis_y = about_y_m or 0.0
     return [
-        box._replace(
-            center_m=(
+        type(box)(
+            box.part,
+            (
                 sign_x * box.center_m[0],
                 axis_y + sign_y * (box.center_m[1] - axis_y),
                 box.center_m[2],
             ),
-            yaw_rad=sign_x * sign_y * box.yaw_rad,
+            box.size_m,
+            sign_x * sign_y * box.yaw_rad,
+            box.material,
         )
         for box in boxes
     ]

@@ -19,20 +19,26 @@ from doorstate.simulation.scene.revolving import revolving_wings
 from doorstate.simulation.scene.wall import Gap, door_gap, wall_boxes
 
 
-def door_boxes(door: Door, opening: Opening, neighbours: Sequence[Gap] = ()) -> list[Box]:
+def door_boxes(
+    door: Door, opening: Opening, neighbours: Sequence[Gap] = (), ends_m: tuple[float, float] | None = None
+) -> list[Box]:
     """Return wall, frame and leaves; the wall comes first and the leaves last."""
-    return [*fixed_boxes(door, neighbours), *leaf_boxes(door, opening)]
+    return [*fixed_boxes(door, neighbours, ends_m), *leaf_boxes(door, opening)]
 
 
-def fixed_boxes(door: Door, neighbours: Sequence[Gap] = ()) -> list[Box]:
+def fixed_boxes(
+    door: Door, neighbours: Sequence[Gap] = (), ends_m: tuple[float, float] | None = None
+) -> list[Box]:
     """Return the parts that do not move: wall, frame, threshold, track and drum.
 
     Args:
         door: door in its wall.
         neighbours: gaps of other doors in the same wall.
+        ends_m: ends of the wall along x; None is the door's own.
     """
-    ends_m = (-door.wall_half_length_m, door.wall_half_length_m)
+    low, high = ends_m or (-door.wall_half_length_m, door.wall_half_length_m)
     sign = -1.0 if door.hinge == "left" else 1.0
+    ends_m = (low, high) if sign > 0 else (-high, -low)
     gaps = [door_gap(door), *(gap._replace(x_m=sign * gap.x_m) for gap in neighbours)]
     wall = wall_boxes(ends_m, door.wall_thickness_m, door.wall_height_m, gaps)
     return [*_to_hinge_and_swing(wall, door), *_frame_boxes(door)]

@@ -37,8 +37,10 @@ class Feature(FrozenModel):
     corner_m: Metres = 0.0  # x of the corner
 
 
-def feature_boxes(feature: Feature, gaps: Sequence[Gap] = ()) -> list[Box]:
-    """Return the wall and the object in or before it, in the door frame; a plain wall may have gaps."""
+def feature_boxes(
+    feature: Feature, gaps: Sequence[Gap] = (), ends_m: tuple[float, float] | None = None
+) -> list[Box]:
+    """Return the wall and the object in or before it, in the door frame; a plain wall may have gaps and ends."""
     match feature.kind:
         case "inner_corner" | "outer_corner":
             return _corner(feature)
@@ -49,8 +51,7 @@ def feature_boxes(feature: Feature, gaps: Sequence[Gap] = ()) -> list[Box]:
             y = -feature.wall_thickness_m / 2
             sash = sash_boxes(feature.width_m, feature.bottom_m, feature.top_m, y)
             return [*_pierced(feature, feature.wall_thickness_m, feature.width_m), *sash]
-        case "wall" if gaps:
-            ends_m = (-_LONG_M, _LONG_M)
+        case "wall" if ends_m:
             return wall_boxes(ends_m, feature.wall_thickness_m, feature.wall_height_m, gaps)
         case "niche":
             back = (2 * _LONG_M, _BACK_M, feature.wall_height_m)

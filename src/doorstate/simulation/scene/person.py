@@ -37,10 +37,10 @@ def person_boxes(person: Person) -> list[Box]:
         x, swing = side * (half - trunk), side * person.stride_m / 2
         boxes += [
             capsule(Part.OTHER, x, 0.0, (_HIP * tall - trunk / 2, _SHOULDER * tall), trunk, material),
-            capsule(Part.OTHER, side * (leg + 0.005), swing, (0.0, _HIP * tall + leg), leg, material),
+            capsule(Part.OTHER, side * 1.25 * leg, swing, (0.0, _HIP * tall + leg), leg, material),
             capsule(
                 Part.OTHER,
-                side * (half + arm),
+                side * (half + 0.5 * arm),
                 -swing / 2,
                 (_WRIST * tall - arm, _SHOULDER * tall - arm),
                 arm,

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,40 @@ from doorstate.simulation.scene.box import Box
 TOLERANCE_M = 0.005  # a leaf's edge is bevelled by about as much as its corner would cut into the jamb
 
 
-def collide(boxes: Sequence[Box], obstacles: Sequence[Box], tolerance_m: float = TOLERANCE_M) -> bool:
+class Footprints(NamedTuple):
+    """Boxes as arrays: what many boxes are checked against is converted once."""
+
+    center: NDArray[np.float64]  # (N, 3)
+    cos: NDArray[np.float64]  # (N,) of the turn
+    sin: NDArray[np.float64]
+    half: NDArray[np.float64]  # (N, 3) half sizes
+
+    @classmethod
+    def of(cls, boxes: Sequence[Box]) -> Footprints:
+        """Return the arrays of some boxes."""
+        center = np.array([box.center_m for box in boxes]).reshape(-1, 3)
+        half = np.array([box.size_m for box in boxes]).reshape(-1, 3) / 2
+        # math, not numpy: libm gives the same bits on processors with different SIMD instructions.
+        cos, sin = ([turn(box.yaw_rad) for box in boxes] for turn in (math.cos, math.sin))
+        return cls(center, np.array(cos), np.array(sin), half)
+
+    def near(self, other: Footprints) -> Footprints:
+        """Return the boxes that may touch the bounding box in plan of some others."""
+        reach, other_reach = (np.hypot(one.half[:, 0], one.half[:, 1])[:, None] for one in (self, other))
+        low = (other.center[:, :2] - other_reach).min(axis=0)
+        high = (other.center[:, :2] + other_reach).max(axis=0)
+        is_near = (self.center[:, :2] + reach > low) & (self.center[:, :2] - reach < high)
+        chosen = np.flatnonzero(is_near.all(axis=1))
+        return Footprints(self.center[chosen], self.cos[chosen], self.sin[chosen], self.half[chosen])
+
+    def joined(self, other: Footprints) -> Footprints:
+        """Return these boxes and some others."""
+        return Footprints(*(np.concatenate(pair) for pair in zip(self, other, strict=True)))
+
+
+def collide(
+    boxes: Sequence[Box], obstacles: Sequence[Box] | Footprints, tolerance_m: float = TOLERANCE_M
+) -> bool:
     """Return True if a box overlaps an obstacle by more than the tolerance.
 
     Separating axis test in plan, and the overlap in height.
@@ -23,25 +57,30 @@ def collide(boxes: Sequence[Box], obstacles: Sequence[Box], tolerance_m: float =
 
 
 def colliding(
-    boxes: Sequence[Box], obstacles: Sequence[Box], tolerance_m: float = TOLERANCE_M
+    boxes: Sequence[Box], obstacles: Sequence[Box] | Footprints, tolerance_m: float = TOLERANCE_M
 ) -> NDArray[np.bool_]:
     """Return for each box True if it overlaps an obstacle by more than the tolerance; as `collide`."""
-    if not boxes or not obstacles:
+    if not boxes:
+        return np.zeros(0, dtype=bool)
+    own = Footprints.of(boxes)
+    other = obstacles if isinstance(obstacles, Footprints) else Footprints.of(obstacles)
+    if tolerance_m >= 0:
+        other = other.near(own)
+    if not len(other.cos):
         return np.zeros(len(boxes), dtype=bool)
-    center, axes, half = _plans(boxes, 1)
-    obstacle_center, obstacle_axes, obstacle_half = _plans(obstacles, 0)
-    apart = obstacle_center - center  # (N, M, 3)
-    separated = np.abs(apart[..., 2]) > half[..., 2] + obstacle_half[..., 2] - tolerance_m
-    # |cosine| between every axis of one box and every axis of the other: (N, M, 2, 2)
-    cosines = np.abs(np.einsum("...ix,...jx->...ij", axes, obstacle_axes))
-    for own_axes, own, opposite, rotated in (
-        (axes, half, obstacle_half, cosines),
-        (obstacle_axes, obstacle_half, half, cosines.swapaxes(-1, -2)),
+    cos, sin, half = own.cos[:, None], own.sin[:, None], own.half[:, None]
+    x, y, z = np.moveaxis(other.center - own.center[:, None], -1, 0)  # (N, M) each
+    separated = np.abs(z) > half[..., 2] + other.half[:, 2] - tolerance_m
+    # |cosine| and |sine| of the turn between the two
+    along = np.abs(cos * other.cos + sin * other.sin)
+    across = np.abs(sin * other.cos - cos * other.sin)
+    for c, s, (width, depth), (other_width, other_depth) in (
+        (cos, sin, (half[..., 0], half[..., 1]), (other.half[:, 0], other.half[:, 1])),
+        (other.cos, other.sin, (other.half[:, 0], other.half[:, 1]), (half[..., 0], half[..., 1])),
     ):
-        away = np.abs(np.einsum("...ix,...x->...i", own_axes, apart[..., :2]))
-        reach = own[..., :2] + np.einsum("...ij,...j->...i", rotated, opposite[..., :2])
-        separated |= (away > reach - tolerance_m).any(axis=-1)
-    hits: NDArray[np.bool_] = np.logical_not(separated).any(axis=1)
+        separated |= np.abs(c * x + s * y) > width + along * other_width + across * other_depth - tolerance_m
+        separated |= np.abs(c * y - s * x) > depth + across * other_width + along * other_depth - tolerance_m
+    hits: NDArray[np.bool_] = np.any(~separated, axis=1)
     return hits
 
 
@@ -65,17 +104,6 @@ def footprint(box: Box) -> list[tuple[float, float]]:
     halves = ((1, 1), (-1, 1), (-1, -1), (1, -1))
     sizes = [(a * box.size_m[0] / 2, b * box.size_m[1] / 2) for a, b in halves]
     return [(box.center_m[0] + x * cos - y * sin, box.center_m[1] + x * sin + y * cos) for x, y in sizes]
-
-
-def _plans(
-    boxes: Sequence[Box], axis: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Return centres, unit axes and half sizes, with an axis inserted to broadcast over the other boxes."""
-    turns = [(math.cos(box.yaw_rad), math.sin(box.yaw_rad)) for box in boxes]
-    axes = np.array([((cos, sin), (-sin, cos)) for cos, sin in turns])
-    center = np.array([box.center_m for box in boxes])
-    half = np.array([box.size_m for box in boxes]) / 2
-    return np.expand_dims(center, axis), np.expand_dims(axes, axis), np.expand_dims(half, axis)
 
 
 def _to_segment(point: tuple[float, float], start: tuple[float, float], end: tuple[float, float]) -> float:

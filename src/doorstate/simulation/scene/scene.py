@@ -26,10 +26,11 @@ from doorstate.simulation.scene.placed_door import (
     pierced_walls,
     placed_door_boxes,
 )
-from doorstate.simulation.scene.room import Space, ceiling_box, floor_box, space_boxes
+from doorstate.simulation.scene.room import WALL_M, Space, ceiling_box, floor_box, space_boxes
 from doorstate.simulation.scene.stairs import Stairs, stairs_boxes
 from doorstate.simulation.scene.wall import Gap
 
+BEYOND_RANGE_M = 12.0
 LayoutKind = Literal["corridor", "room", "junction", "lobby", "stairwell"]
 SceneKind = Literal["door"] | FeatureKind | FixtureKind | ApertureKind
 
@@ -99,6 +100,13 @@ class Scene(FrozenModel):
         gaps = neighbours(self.other_doors or ())
         return gaps + [aperture.gap for aperture in self.apertures or () if aperture.wall == "main"]
 
+    def main_ends_m(self) -> tuple[float, float] | None:
+        """Return the ends along x of that wall in a building, where it ends with the room."""
+        if self.layout is None:
+            return None
+        left, right = (side or BEYOND_RANGE_M for side in (self.near.left_m, self.near.right_m))
+        return -right - WALL_M, left + WALL_M
+
     def without_clutter(self) -> Self:
         """Return the scene without items and people."""
         return self.model_copy(update={"items": (), "people": None})
@@ -136,10 +144,10 @@ def box_groups(scene: Scene, opening: Opening, other_openings: Sequence[Opening]
     """
     others = scene.other_doors or ()
     if scene.door:
-        main = door_boxes(scene.door, opening, scene.main_gaps())
+        main = door_boxes(scene.door, opening, scene.main_gaps(), scene.main_ends_m())
     else:
         assert scene.feature is not None
-        main = feature_boxes(scene.feature, scene.main_gaps())
+        main = feature_boxes(scene.feature, scene.main_gaps(), scene.main_ends_m())
     other_boxes = [
         placed_door_boxes(placed, own, scene.near) for placed, own in zip(others, other_openings, strict=True)
     ]

@@ -46,8 +46,8 @@ def draw_passage(stream: Stream, plan: Plan, wall: int, full_height: bool) -> Wa
     length, height = plan.layout.wall_length_m(wall), plan.height_m
     if full_height:
         width = stream.uniform(1.2, 2.6)
-        half = round(width / 2, 4)
-        beyond = Space(left_m=half, right_m=half, depth_m=stream.uniform(2.0, 8.0))
+        left = right = round(width / 2, 4)
+        beyond = Space(left_m=left, right_m=right, depth_m=stream.uniform(2.0, 8.0))
         top = height
     else:
         width = stream.uniform(0.8, 2.0)
@@ -63,7 +63,15 @@ def draw_passage(stream: Stream, plan: Plan, wall: int, full_height: bool) -> Wa
         wall_thickness_m=plan.thicknesses_m[wall],
         beyond=beyond,
     )
-    return place(stream, plan, wall, passage) if length > width + 0.3 else None
+    placed = place(stream, plan, wall, passage) if length > width + 0.3 else None
+    if placed is None or full_height:
+        return placed
+    # The room behind ends with the wall.
+    ends = {
+        "left_m": round(min(left, length - placed.along_m), 4),
+        "right_m": round(min(right, placed.along_m), 4),
+    }
+    return placed._replace(aperture=passage.model_copy(update={"beyond": beyond.model_copy(update=ends)}))
 
 
 def draw_niche(stream: Stream, plan: Plan, wall: int) -> WallAperture | None:

@@ -22,6 +22,7 @@ _SHARES: dict[_Group, float] = {
     "carton": 0.08,
     "cabinet": 0.1,
 }
+_NARROW_SHARES: dict[_Group, float] = {"bin": 0.25, "plant": 0.25, "chairs": 0.25, "carton": 0.25}
 _NARROW_M = 2.2  # rooms below this width have no tables
 _TRIES = 3
 _OFF_WALL_M = 0.03
@@ -33,7 +34,7 @@ def draw_furniture(stream: Stream, plan: Plan, obstacles: list[Box]) -> tuple[It
     most = {"room": 5, "lobby": 3, "corridor": 2, "junction": 2, "stairwell": 1}[plan.kind]
     taken, items = list(obstacles), list[Item]()
     for _ in range(stream.integer(0, most)):
-        group = stream.choice(_SHARES if wide else {"bin": 1, "plant": 1, "chairs": 1, "carton": 1})
+        group = stream.choice(_SHARES if wide else _NARROW_SHARES)
         for _ in range(_TRIES):
             new = _draw_group(stream, plan, group)
             boxes = [box for item in new for box in item_boxes(item)]
@@ -74,7 +75,13 @@ def _draw_group(stream: Stream, plan: Plan, group: _Group) -> list[Item]:
             return [_item("plant", free, (side, side, stream.uniform(0.6, 1.8)))]
         case "bin":
             side = stream.uniform(0.22, 0.4)
-            return [_item("bin", at_wall.after(Pose(0.0, side / 2 + 0.02, 0.0)), (side, side, stream.uniform(0.3, 0.9)))]
+            return [
+                _item(
+                    "bin",
+                    at_wall.after(Pose(0.0, side / 2 + 0.02, 0.0)),
+                    (side, side, stream.uniform(0.3, 0.9)),
+                )
+            ]
         case "carton":
             sides = (stream.uniform(0.25, 0.6), stream.uniform(0.25, 0.6), stream.uniform(0.2, 1.2))
             return [_item("carton", free, sides)]

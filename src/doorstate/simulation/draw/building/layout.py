@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 from doorstate.simulation.draw.building.apertures import draw_passage, draw_windows
@@ -28,7 +27,6 @@ LAYOUTS: dict[LayoutKind, float] = {
 }
 _INNER_WALL_M, _OUTER_WALL_M = (0.08, 0.25), (0.24, 0.45)
 _STAIRWELL_HEIGHT_M = (4.6, 5.6)
-_WALL_HALF_LENGTH_M = 12.0  # beyond the ends of every room
 _PLACE_TRIES = 12
 _LANDING_M = 1.1
 
@@ -57,7 +55,9 @@ def draw_plan(stream: Stream, has_doors: bool) -> Plan:
         stream.uniform(*_INNER_WALL_M),
         stream.uniform(*_INNER_WALL_M),
     )
-    ends = (True, True) if kind in ("room", "lobby", "stairwell") else (stream.chance(0.75), stream.chance(0.6))
+    ends = (
+        (True, True) if kind in ("room", "lobby", "stairwell") else (stream.chance(0.75), stream.chance(0.6))
+    )
     layout = Layout(length, width, (True, ends[0], True, ends[1]))
     height = stream.uniform(*(_STAIRWELL_HEIGHT_M if kind == "stairwell" else WALL_HEIGHT_M))
     plan = Plan(kind, layout, thicknesses, height)
@@ -119,7 +119,6 @@ def _with_door(stream: Stream, plan: Plan, wall: int) -> Plan:
     ):
         return plan
     door = draw_building_door(stream, (plan.thicknesses_m[wall], plan.height_m))
-    door = door.model_copy(update={"wall_half_length_m": _WALL_HALF_LENGTH_M})
     stairs = [flight.outline() for flight in plan.stairs]
     for _ in range(_PLACE_TRIES):
         candidate = WallDoor(wall, stream.uniform(0.0, plan.layout.wall_length_m(wall)), door)
@@ -142,11 +141,13 @@ def _with_lifts(stream: Stream, plan: Plan) -> Plan:
     if any(one.wall == 0 for one in plan.apertures):
         return plan
     door = draw_lift_door(stream, (plan.thicknesses_m[0], plan.height_m))
-    door = door.model_copy(update={"wall_half_length_m": _WALL_HALF_LENGTH_M})
     half, depth = stream.uniform(0.55, 1.0), stream.uniform(1.2, 2.2)
     cabin = Space(left_m=half, right_m=half, depth_m=depth)
-    count, pitch = stream.integer(1, 3), 2 * max(half, door.opening_width_m) + stream.uniform(0.15, 0.6)
-    first = stream.uniform(0.8, 1.6)
+    count, pitch = (
+        stream.integer(1, 3),
+        max(2 * half, 2 * door.opening_width_m, 2 * door.half_width_m + 0.35) + stream.uniform(0.15, 0.6),
+    )
+    first = stream.uniform(1.0, 1.7) + door.opening_width_m / 2
     for number in range(count):
         lift = WallDoor(0, round(first + number * pitch, 4), door, cabin)
         if plan.fits(lift):
@@ -157,8 +158,7 @@ def _with_lifts(stream: Stream, plan: Plan) -> Plan:
 def draw_spaces_behind(stream: Stream, plan: Plan) -> Plan:
     """Draw the space behind each door that has none yet: a room, open space, or outdoors.
 
-    Rooms end between their own door and the next opening of the wall, and at the wall's ends if the wall around the
-    corner has openings too.
+    Rooms end between their own door and the next opening of the wall, and at the wall's ends.
     """
     doors = []
     for door in plan.layout.doors:
@@ -183,10 +183,8 @@ def _draw_space(stream: Stream, plan: Plan, door: WallDoor) -> Space:
 
 def interval(plan: Plan, opening: WallDoor | WallAperture) -> tuple[float, float]:
     """Return the ends of the stretch of wall behind which the space of an opening may lie."""
-    length, wall = plan.layout.wall_length_m(opening.wall), opening.wall
-    before, after = plan.openings((wall - 1) % 4), plan.openings((wall + 1) % 4)
-    low, high = (0.0 if before else -math.inf), (length if after else math.inf)
-    for other in plan.openings(wall):
+    low, high = 0.0, plan.layout.wall_length_m(opening.wall)
+    for other in plan.openings(opening.wall):
         middle = _middle_between(opening, other)
         if other.along_m < opening.along_m:
             low = max(low, middle + 0.05)
@@ -203,5 +201,3 @@ def _middle_between(opening: WallDoor | WallAperture, other: WallDoor | WallAper
     if reach:
         return other.along_m + side * (reach + 0.1)
     return (opening.along_m + other.along_m) / 2
-
-

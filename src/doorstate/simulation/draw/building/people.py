@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import math
+
 from doorstate.simulation.draw.building.plan import Plan
 from doorstate.simulation.draw.layouts import PlacedCamera
 from doorstate.simulation.draw.stream import Stream
@@ -12,6 +14,7 @@ from doorstate.simulation.scene.plan import collide
 
 _CHANCE = 0.4
 _TRIES = 3
+_FROM_CAMERA_M = 0.8
 _CLOTHES: dict[Material, float] = {"matte": 0.6, "dark": 0.4}
 
 
@@ -27,16 +30,15 @@ def draw_people(
         for _ in range(_TRIES):
             person = _draw_person(stream, plan, camera, target_m)
             boxes = person_boxes(person)
-            if not collide(boxes, taken, 0.0):
+            near = math.dist((person.x_m, person.y_m), camera.pose[:2]) < _FROM_CAMERA_M
+            if not near and not collide(boxes, taken, 0.0):
                 people.append(person)
                 taken += boxes
                 break
     return tuple(people)
 
 
-def _draw_person(
-    stream: Stream, plan: Plan, camera: PlacedCamera, target_m: tuple[float, float]
-) -> Person:
+def _draw_person(stream: Stream, plan: Plan, camera: PlacedCamera, target_m: tuple[float, float]) -> Person:
     if stream.chance(0.5):
         way = stream.uniform(0.25, 0.95)
         x, y = (
@@ -55,4 +57,3 @@ def _draw_person(
         stride_m=stream.uniform(0.2, 0.75) if stream.chance(0.5) else 0.0,
         material=stream.choice(_CLOTHES),
     )
-

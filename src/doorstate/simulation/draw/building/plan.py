@@ -17,7 +17,7 @@ from doorstate.simulation.scene.door import Opening
 from doorstate.simulation.scene.feature import Feature
 from doorstate.simulation.scene.fixture import Fixture, FixtureKind
 from doorstate.simulation.scene.person import Person
-from doorstate.simulation.scene.room import Space
+from doorstate.simulation.scene.room import OUTDOORS
 from doorstate.simulation.scene.scene import BoxGroups, LayoutKind, Scene, box_groups
 from doorstate.simulation.scene.stairs import Stairs
 
@@ -101,7 +101,7 @@ class Plan(NamedTuple):
             feature = Feature(
                 kind="wall", wall_thickness_m=self.thicknesses_m[wall], wall_height_m=self.height_m
             )
-            scene = Scene(feature=feature, near=self.layout.near(wall, along_m))
+            scene = Scene(feature=feature, near=self.layout.near(wall, along_m), far=OUTDOORS)
         frame = self.on_wall(wall, along_m)
         apertures = []
         for one in self.apertures:
@@ -143,11 +143,6 @@ def turned(pose: Pose, frame: Pose) -> tuple[float, float, float]:
 def closed_door_boxes(groups: BoxGroups) -> list[list[Box]]:
     """Return the boxes of each door of a plan, first those of the first door and its wall."""
     return [groups.main, *groups.other_doors]
-
-
-def space_behind(space: Space) -> bool:
-    """Return True if something can stand behind a door or passage."""
-    return not space.is_outdoors and bool(space.depth_m)
 
 
 def _edge_m(opening: WallDoor | WallAperture) -> float:

@@ -6,31 +6,39 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from itertools import permutations
+from typing import NamedTuple
 
 from doorstate.doorways.remoteness import remoteness_m
 from doorstate.simulation.draw.building.apertures import draw_niche, draw_passage, draw_windows
 from doorstate.simulation.draw.building.furniture import draw_furniture
 from doorstate.simulation.draw.building.layout import draw_plan, draw_spaces_behind
 from doorstate.simulation.draw.building.people import draw_people
-from doorstate.simulation.draw.building.plan import Place, Plan, closed_door_boxes
+from doorstate.simulation.draw.building.plan import Place, Plan, WallAperture, closed_door_boxes
 from doorstate.simulation.draw.building.swing import draw_door_openings, swept_boxes
-from doorstate.simulation.draw.building.view import View, look
+from doorstate.simulation.draw.building.view import COARSE, View, look, shows_rectangle
 from doorstate.simulation.draw.building.viewpoint import body_box, draw_camera
 from doorstate.simulation.draw.building.walls import clear_of, draw_fixture, draw_wall_fixtures
 from doorstate.simulation.draw.layouts import PlacedCamera
 from doorstate.simulation.draw.scenes import DrawnScene, exhausted, solid
 from doorstate.simulation.draw.stream import Stream
-from doorstate.simulation.scene.aperture import APERTURES, ApertureKind
+from doorstate.simulation.scene.aperture import ApertureKind
 from doorstate.simulation.scene.box import Box
+from doorstate.simulation.scene.clutter import item_boxes
 from doorstate.simulation.scene.door import Opening
 from doorstate.simulation.scene.fixture import FixtureKind, fixture_boxes
 from doorstate.simulation.scene.plan import collide
 from doorstate.simulation.scene.scene import BoxGroups
+from doorstate.types import Part
 
 _TRIES, _CAMERA_TRIES = 200, 5
 RANGE_M = (0.4, 5.0)
 LEAST_MEASURED = 0.4  # of the rays, within the range
-LEAST_DOOR_RAYS = 5  # of 432: about 3500 pixels of 640 x 480
+LEAST_DOOR, USUAL_DOOR = (
+    0.012,
+    0.07,
+)  # shares of the rays that a door in view needs; the second in most scenes
+_USUAL_CHANCE = 0.75
+LEAST_SHOWN = 0.4  # of the outline of what a view without a door is about
 _MOST_BESIDE_NORMAL_DEG = 88.0
 
 SUBJECTS: dict[FixtureKind | ApertureKind | None, float] = {
@@ -76,17 +84,20 @@ def _draw_with_doors(stream: Stream, plan: Plan) -> DrawnScene | None:
     swept = swept_boxes(plan, openings)
     walls = [*solid(groups.room), *(box for boxes in closed_door_boxes(groups) for box in boxes)]
     target = stream.integer(0, len(plan.layout.doors) - 1)
+    least = USUAL_DOOR if stream.chance(_USUAL_CHANCE) else LEAST_DOOR
     for _ in range(_CAMERA_TRIES):
         frame = plan.layout.door_frame(target)
         camera = draw_camera(stream, plan, frame)
         if camera is None or collide([body_box(camera)], [*walls, *swept], -0.05):
             continue
         # A first look at the bare room saves furnishing it in vain.
-        if _main_door(plan, groups, camera) is None:
+        if _main_door(plan, look(groups.all(), camera, COARSE), groups, camera, least) is None:
             continue
         furnished = _furnish(stream, plan, camera, (frame.x_m, frame.y_m), [*walls, *swept])
-        if (main := _main_door(furnished, furnished.box_groups(0), camera)) is not None:
-            return _drawn(furnished, camera, main, openings)
+        groups_then = furnished.box_groups(0)
+        main = _main_door(furnished, look(groups_then.all(), camera), groups_then, camera, least)
+        if main is not None:
+            return _drawn(stream, furnished, camera, main, openings)
     return None
 
 
@@ -98,23 +109,110 @@ def _furnish(
     fixtures = (*plan.fixtures, *draw_wall_fixtures(stream, plan, taken))
     taken += [box for fixture in fixtures for box in fixture_boxes(fixture)]
     plan = plan._replace(fixtures=fixtures, items=draw_furniture(stream, plan, taken))
-    taken += plan.scene(Place(0, 0.0)).items and _item_boxes(plan)
+    taken += [box for item in plan.items for box in item_boxes(item)]
     return plan._replace(people=draw_people(stream, plan, camera, target_m, taken))
 
 
-def _main_door(plan: Plan, groups: BoxGroups, camera: PlacedCamera) -> int | None:
+def _main_door(
+    plan: Plan, view: View, groups: BoxGroups, camera: PlacedCamera, least_share: float
+) -> int | None:
     """Return the number of the door most in front of those in view; None if none is, or the view is too empty."""
-    view = look(groups.all(), camera)
     if view.share_between(*RANGE_M) < LEAST_MEASURED:
         return None
+    boxes = groups.all()
     remoteness = {}
-    for number, numbers in enumerate(groups.doors()):
-        if number == 0:
-            wall_boxes = sum(box.part == groups.main[0].part for box in groups.main)
-            numbers = numbers[wall_boxes:]
+    for number, own in enumerate(groups.doors()):
+        numbers = [index for index in own if boxes[index].part in (Part.LEAF, Part.FRAME)]
         seen = plan.layout.door_frame(number).inverse().after(camera.pose)
         beside_deg = math.degrees(math.atan2(abs(seen.x_m), seen.y_m))
-        if view.rays_on(numbers, RANGE_M[1]) >= LEAST_DOOR_RAYS and beside_deg <= _MOST_BESIDE_NORMAL_DEG:
+        if view.share_on(numbers, RANGE_M[1]) >= least_share and beside_deg <= _MOST_BESIDE_NORMAL_DEG:
             ahead = camera.pose.inverse().after(plan.layout.door_frame(number))
             remoteness[number] = remoteness_m(ahead.x_m, ahead.y_m)
     return min(remoteness, key=remoteness.__getitem__) if remoteness else None
+
+
+def _drawn(
+    stream: Stream, plan: Plan, camera: PlacedCamera, main: int, openings: Sequence[Sequence[Opening]]
+) -> DrawnScene:
+    """Return the scene in the frame of its main door, whose openings come in the order of their states."""
+    columns = [list(openings[main])]
+    for number, own in enumerate(openings):
+        if number != main:
+            order = stream.choice(dict.fromkeys(permutations(range(3)), 1.0))
+            columns.append([own[position] for position in order])
+    rows = list(zip(*columns, strict=True))
+    return DrawnScene(
+        plan.scene(main),
+        camera.viewpoint(plan.layout.door_frame(main)),
+        [row[0] for row in rows],
+        other_openings=[row[1:] for row in rows],
+    )
+
+
+class _Subject(NamedTuple):
+    """What a view without a door is about: a plan that contains it, where it is, and its outline on the wall."""
+
+    plan: Plan
+    place: Place
+    width_m: float
+    heights_m: tuple[float, float]
+
+
+def _draw_without_door(
+    stream: Stream, plan: Plan, shows: FixtureKind | ApertureKind | None
+) -> DrawnScene | None:
+    walls = [number for number in range(4) if plan.layout.has_wall[number]]
+    subject = _draw_subject(stream, plan, stream.choice(dict.fromkeys(walls, 1.0)), shows)
+    if subject is None:
+        return None
+    plan, place, width_m, heights_m = subject
+    groups, frame = plan.box_groups(place), plan.on_wall(*place)
+    obstacles = [*solid(groups.room), *groups.main]
+    for _ in range(_CAMERA_TRIES):
+        camera = draw_camera(stream, plan, frame)
+        if camera is None or collide([body_box(camera)], obstacles, -0.05):
+            continue
+        if shows_rectangle(camera, frame, width_m, heights_m) < LEAST_SHOWN:
+            continue
+        furnished = _furnish(stream, plan, camera, (frame.x_m, frame.y_m), obstacles)
+        view = look(furnished.box_groups(place).all(), camera)
+        if view.share_between(*RANGE_M) >= LEAST_MEASURED:
+            return DrawnScene(furnished.scene(place, shows), camera.viewpoint(frame), [Opening()])
+    return None
+
+
+def _draw_subject(
+    stream: Stream, plan: Plan, wall: int, shows: FixtureKind | ApertureKind | None
+) -> _Subject | None:
+    """Draw what the view is about into a wall; None if it does not fit there."""
+    if shows is None:
+        along = stream.uniform(0.3, plan.layout.wall_length_m(wall) - 0.3)
+        blocked = any(abs(one.along_m - along) < one.half_m for one in plan.openings(wall))
+        return None if blocked else _Subject(plan, Place(wall, along), 1.0, (0.3, 2.0))
+    if shows == "window" or shows == "niche" or shows == "passage":
+        placed = [] if plan.openings(wall) else _draw_apertures(stream, plan, wall, shows)
+        if not placed:
+            return None
+        shown = placed[stream.integer(0, len(placed) - 1)]
+        plan, hole = plan._replace(apertures=(*plan.apertures, *placed)), shown.aperture
+        return _Subject(plan, Place(wall, shown.along_m), hole.width_m, (hole.bottom_m, hole.top_m))
+    low, high = stream.choice(dict.fromkeys(plan.free_stretches(wall), 1.0))
+    if high - low < 0.5:
+        return None
+    along = stream.uniform(low, high)
+    most = 2 * min(along - low, high - along) - 0.04
+    fixture = draw_fixture(stream, plan, shows, wall, along, most)
+    if fixture is None or not clear_of([fixture], [flight.outline() for flight in plan.stairs]):
+        return None
+    plan, heights_m = plan._replace(fixtures=(fixture,)), (fixture.bottom_m, min(fixture.top_m, 2.2))
+    return _Subject(plan, Place(wall, along), fixture.width_m, heights_m)
+
+
+def _draw_apertures(stream: Stream, plan: Plan, wall: int, kind: str) -> list[WallAperture]:
+    if kind == "window":
+        return draw_windows(stream, plan, wall)
+    if kind == "niche":
+        aperture = draw_niche(stream, plan, wall)
+    else:
+        aperture = draw_passage(stream, plan, wall, full_height=stream.chance(0.3))
+    return [aperture] if aperture else []

@@ -32,7 +32,9 @@ def draw_stairs(stream: Stream, plan: Plan) -> Plan:
     up = _stairs(Pose(start, width - flight / 2 - 0.01, yaw), flight, going, rise, (steps, landing), rails)
     stairs = [up]
     if width - 2 * flight > 1.25 and stream.chance(0.5):
-        down = _stairs(Pose(start, width - 1.5 * flight - 0.15, yaw), flight, going, -rise, (steps, landing), rails)
+        down = _stairs(
+            Pose(start, width - 1.5 * flight - 0.15, yaw), flight, going, -rise, (steps, landing), rails
+        )
         stairs.append(down)
     return plan._replace(stairs=tuple(stairs))
 

@@ -16,7 +16,7 @@ HEIGHT_M, PITCH_DEG, ROLL_DEG = (0.25, 1.8), (-20.0, 35.0), (-5.0, 5.0)
 _OFF_WALL_M = 0.3
 _BODY_M = 0.4  # of a slim robot, or of a person with a camera in their hands
 _MOST_BESIDE_NORMAL_DEG = 87.0
-_OFFSET_DEG = 38.0  # of the target from the middle of the view: doors are cut by the edge of the picture
+_OFFSET_DEG, _WIDE_OFFSET_DEG = 18.0, 38.0  # of the target from the middle; the wider ones cut doors off
 _TRIES = 40
 
 
@@ -39,7 +39,8 @@ def draw_camera(stream: Stream, plan: Plan, target: Pose) -> PlacedCamera | None
         x, y = round(spot.x_m, 4), round(spot.y_m, 4)
         if _OFF_WALL_M <= x <= length - _OFF_WALL_M and _OFF_WALL_M <= y <= width - _OFF_WALL_M:
             bearing = math.atan2(target.y_m - y, target.x_m - x)
-            heading = bearing + math.radians(stream.uniform(-_OFFSET_DEG, _OFFSET_DEG))
+            offset = _OFFSET_DEG if stream.chance(0.5) else _WIDE_OFFSET_DEG
+            heading = bearing + math.radians(stream.uniform(-offset, offset))
             if plan.kind in ("corridor", "junction") and stream.chance(0.4):
                 # Robots drive along corridors.
                 along = 0.0 if math.cos(bearing) > 0 else math.pi

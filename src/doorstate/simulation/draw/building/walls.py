@@ -70,7 +70,8 @@ def draw_wall_fixtures(stream: Stream, plan: Plan, obstacles: list[Box]) -> tupl
     """
     has_skirting, skirting = stream.chance(0.55), (stream.uniform(0.05, 0.14), stream.uniform(0.008, 0.02))
     has_duct, duct_z = stream.chance(0.15), stream.choice({0.12: 1, stream.uniform(0.9, 1.1): 1, 2.2: 1})
-    has_rail, crowded = stream.chance(0.12), stream.uniform(0.2, 1.0)
+    has_rail = stream.chance(0.15) and plan.kind in ("corridor", "stairwell")
+    crowded = stream.uniform(0.2, 1.0)
     fixtures: list[Fixture] = []
     taken = list(obstacles)
     for wall in range(4):
@@ -83,9 +84,11 @@ def draw_wall_fixtures(stream: Stream, plan: Plan, obstacles: list[Box]) -> tupl
                 new.append(at("skirting", 0.5, high - low - 2 * _CORNER_M, skirting[1], (0.0, skirting[0])))
             if has_duct and high - low > 0.5:
                 new.append(at("duct", 0.5, high - low - 0.1, 0.05, (duct_z, duct_z + 0.08)))
-            if has_rail and plan.kind in ("corridor", "stairwell") and high - low > 0.8:
+            has_handrail = has_rail and high - low > 0.8
+            if has_handrail:
                 new.append(at("handrail", 0.5, high - low - 0.1, 0.07, (0.0, 0.9)))
-            new += _draw_row(stream, plan, wall, (low, high), crowded)
+            row = _draw_row(stream, plan, wall, (low, high), crowded)
+            new += [one for one in row if one.bottom_m > 0.95] if has_handrail else row
         new += [
             switch
             for one in plan.openings(wall)
