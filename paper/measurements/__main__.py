@@ -162,6 +162,21 @@ def sensors(
 
 
 @app.command()
+def buildings(
+    out: Out = Path("docs/benchmarks"),
+    scenes: Annotated[int, typer.Option(help="Number of scenes of each preset.", min=1)] = 300,
+) -> None:
+    """Describe the scenes of buildings: what they contain, and how their doors are seen."""
+    from doorstate.cli.progress import progress_bar
+
+    from .buildings import measure_buildings, quantile_table, share_table
+
+    with progress_bar("scenes") as progress:
+        measured = measure_buildings(scenes, progress)
+    _write((quantile_table(measured), share_table(measured)), out / "buildings.md", scenes=scenes)
+
+
+@app.command()
 def leveling(out: Out = Path("docs/benchmarks"), count: Count = 100) -> None:
     """Compare tilt and floor that clouds show with the true ones, for cameras level, tilted and on their side."""
     from doorstate.cli.progress import progress_bar

@@ -15,7 +15,7 @@ from doorstate.evaluation.figures.factors import factors_figure
 from doorstate.evaluation.figures.poses import errors_figure
 
 from .. import paths
-from . import door_kinds, reports, scenes, sensors, states, view
+from . import buildings, door_kinds, reports, scenes, sensors, states, view
 
 COLORS = 128  # enough for all of them, and a third of the size
 
@@ -27,6 +27,7 @@ PICTURES: Mapping[str, Callable[[], bytes]] = {
     "corridor": partial(scenes.draw, "corridor"),
     "two-doors": partial(scenes.draw, "two-doors"),
     "door-kinds": door_kinds.draw,
+    "buildings": buildings.draw,
     "sensors": sensors.draw,
     "view": view.draw,
     "results-by-pose-errors": partial(reports.draw, "by-pose", "errors_in_plan", errors_figure),

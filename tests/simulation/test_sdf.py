@@ -17,6 +17,7 @@ from doorstate.simulation.presets import PRESETS, draw_rows
 from doorstate.simulation.render import cut_range, render_behind_glass
 from doorstate.simulation.row import Row
 from doorstate.simulation.scene import Box, Door
+from doorstate.simulation.scene.capsule import Capsule
 from doorstate.simulation.scene.fittings import Fitting
 from doorstate.simulation.scene.scene import Scene
 from doorstate.simulation.sdf import sdf_world
@@ -45,14 +46,33 @@ def numbers(element: ET.Element, path: str) -> list[float]:
 
 
 def read_boxes(world: ET.Element, kind: str) -> list[Box]:
-    boxes = []
+    boxes, ends = [], {}
     for element in world.iterfind(f"model[@name='scene']/link/{kind}"):
         x, y, z, roll, pitch, yaw = numbers(element, "pose")
         assert roll == pitch == 0
-        part = Part[element.get("name", "").split("_")[1].upper()]
+        number, part, *shape = element.get("name", "").split("_")
         glass = element.find("transparency") is not None
-        size = tuple(numbers(element, "geometry/box/size"))
-        boxes.append(Box(part, (x, y, z), size, yaw, "glass" if glass else "matte"))
+        if not shape:
+            size = tuple(numbers(element, "geometry/box/size"))
+            boxes.append(Box(Part[part.upper()], (x, y, z), size, yaw, "glass" if glass else "matte"))
+            continue
+        # A capsule: its spheres are at the ends of its cylinder, which is left out if it has no length.
+        (radius,) = numbers(element, f"geometry/{'cylinder' if shape == ['cylinder'] else 'sphere'}/radius")
+        if shape == ["cylinder"]:
+            ends[number] = numbers(element, "geometry/cylinder/length")[0]
+        elif shape == ["top"]:
+            ends[number, "top"] = z
+        else:
+            top = ends[number, "top"]
+            assert top - z == pytest.approx(ends.get(number, 0.0))
+            boxes.append(
+                Capsule(
+                    Part[part.upper()],
+                    (x, y, (top + z) / 2),
+                    (2 * radius, 2 * radius, top - z + 2 * radius),
+                    yaw,
+                )
+            )
     return boxes
 
 
@@ -80,12 +100,18 @@ def test_a_world_reads_back_to_the_same_boxes_and_depth(row: Row) -> None:
     assert world is not None
     assert world.get("name") == row.sample_id
     boxes = read_boxes(world, "visual")
-    assert [box._replace(material="matte") for box in boxes] == [
-        box._replace(material="matte") for box in row.boxes()
-    ]
-    assert [box.material == "glass" for box in boxes] == [box.material == "glass" for box in row.boxes()]
+    assert [type(box) for box in boxes] == [type(box) for box in row.boxes()]
+    for box, expected in zip(boxes, row.boxes(), strict=True):
+        assert (box.part, box.material == "glass") == (expected.part, expected.material == "glass")
+        # Heights of capsules are sums.
+        assert [*box.center_m, *box.size_m, box.yaw_rad] == pytest.approx(
+            [*expected.center_m, *expected.size_m, expected.yaw_rad],
+            rel=0,
+            abs=1e-12 if isinstance(expected, Capsule) else 0,
+        )
     assert len(read_boxes(world, "collision")) == len(boxes)
-    assert len({element.get("name") for element in world.iter("visual")}) == len(boxes)
+    names = [element.get("name") for element in world.iter("visual")]
+    assert len(set(names)) == len(names)
     pose, camera = read_camera(world)
     assert pose == row.camera_pose()
     depth = cut_range(render_behind_glass(boxes, pose, camera.intrinsics()), camera).depth_m

@@ -45,9 +45,8 @@ _SIZES: dict[LayoutKind, _Size] = {
 }
 
 
-def draw_plan(stream: Stream, has_doors: bool) -> Plan:
+def draw_plan(stream: Stream, kind: LayoutKind, has_doors: bool) -> Plan:
     """Draw a room with doors and apertures; far spaces of doors are drawn by `draw_spaces_behind`."""
-    kind = stream.choice(LAYOUTS)
     length, width = (stream.uniform(*ends) for ends in _SIZES[kind])
     thicknesses = (
         stream.uniform(*_INNER_WALL_M),

@@ -11,12 +11,12 @@ from typing import NamedTuple
 from doorstate.doorways.remoteness import remoteness_m
 from doorstate.simulation.draw.building.apertures import draw_niche, draw_passage, draw_windows
 from doorstate.simulation.draw.building.furniture import draw_furniture
-from doorstate.simulation.draw.building.layout import draw_plan, draw_spaces_behind
+from doorstate.simulation.draw.building.layout import LAYOUTS, draw_plan, draw_spaces_behind
 from doorstate.simulation.draw.building.people import draw_people
 from doorstate.simulation.draw.building.plan import Place, Plan, WallAperture, closed_door_boxes
 from doorstate.simulation.draw.building.swing import draw_door_openings, swept_boxes
 from doorstate.simulation.draw.building.view import COARSE, View, look, shows_rectangle
-from doorstate.simulation.draw.building.viewpoint import body_box, draw_camera
+from doorstate.simulation.draw.building.viewpoint import DISTANCE_M, body_box, draw_camera
 from doorstate.simulation.draw.building.walls import clear_of, draw_fixture, draw_wall_fixtures
 from doorstate.simulation.draw.layouts import PlacedCamera
 from doorstate.simulation.draw.scenes import DrawnScene, exhausted, solid
@@ -37,7 +37,7 @@ LEAST_DOOR, USUAL_DOOR = (
     0.012,
     0.07,
 )  # shares of the rays that a door in view needs; the second in most scenes
-_USUAL_CHANCE = 0.75
+_USUAL_CHANCE = 0.6
 LEAST_SHOWN = 0.4  # of the outline of what a view without a door is about
 _MOST_BESIDE_NORMAL_DEG = 88.0
 
@@ -57,8 +57,9 @@ SUBJECTS: dict[FixtureKind | ApertureKind | None, float] = {
 
 def draw_building(stream: Stream) -> DrawnScene:
     """Draw a room of a building with at least one door in view."""
+    kind = stream.choice(LAYOUTS)
     for _ in range(_TRIES):
-        plan = draw_plan(stream, has_doors=True)
+        plan = draw_plan(stream, kind, has_doors=True)
         if plan.layout.doors:
             drawn = _draw_with_doors(stream, draw_spaces_behind(stream, plan))
             if drawn:
@@ -68,9 +69,9 @@ def draw_building(stream: Stream) -> DrawnScene:
 
 def draw_building_no_door(stream: Stream) -> DrawnScene:
     """Draw a room of a building without a door; the camera looks at a wall or at something else than a door."""
-    shows = stream.choice(SUBJECTS)
+    kind, shows = stream.choice(LAYOUTS), stream.choice(SUBJECTS)
     for _ in range(_TRIES):
-        drawn = _draw_without_door(stream, draw_plan(stream, has_doors=False), shows)
+        drawn = _draw_without_door(stream, draw_plan(stream, kind, has_doors=False), shows)
         if drawn:
             return drawn
     raise exhausted(_TRIES)
@@ -124,6 +125,9 @@ def _main_door(
     for number, own in enumerate(groups.doors()):
         numbers = [index for index in own if boxes[index].part in (Part.LEAF, Part.FRAME)]
         seen = plan.layout.door_frame(number).inverse().after(camera.pose)
+        # A door that is nearer than any target is not one that a robot still looks at.
+        if math.hypot(seen.x_m, seen.y_m) < DISTANCE_M[0]:
+            continue
         beside_deg = math.degrees(math.atan2(abs(seen.x_m), seen.y_m))
         if view.share_on(numbers, RANGE_M[1]) >= least_share and beside_deg <= _MOST_BESIDE_NORMAL_DEG:
             ahead = camera.pose.inverse().after(plan.layout.door_frame(number))

@@ -13,11 +13,11 @@ from doorstate.types import Part
 
 DISTANCE_M = (0.6, 6.0)
 HEIGHT_M, PITCH_DEG, ROLL_DEG = (0.25, 1.8), (-20.0, 35.0), (-5.0, 5.0)
-_OFF_WALL_M = 0.3
+_OFF_WALL_M, _FAR_M = 0.3, 1.5
 _BODY_M = 0.4  # of a slim robot, or of a person with a camera in their hands
 _MOST_BESIDE_NORMAL_DEG = 87.0
 _OFFSET_DEG, _WIDE_OFFSET_DEG = 18.0, 38.0  # of the target from the middle; the wider ones cut doors off
-_TRIES = 40
+_TRIES, _TRIES_PER_DISTANCE = 40, 10  # so that far places of narrow rooms are found too
 
 
 def draw_camera(stream: Stream, plan: Plan, target: Pose) -> PlacedCamera | None:
@@ -32,8 +32,9 @@ def draw_camera(stream: Stream, plan: Plan, target: Pose) -> PlacedCamera | None
     pitch = stream.uniform(-8, 12) if stream.chance(0.5) else stream.uniform(*PITCH_DEG)
     roll = stream.uniform(-1.5, 1.5) if stream.chance(0.5) else stream.uniform(*ROLL_DEG)
     length, width = plan.layout.length_m, plan.layout.width_m
-    for _ in range(_TRIES):
-        distance = stream.uniform(*DISTANCE_M)
+    for number in range(_TRIES):
+        if number % _TRIES_PER_DISTANCE == 0:
+            distance = stream.uniform(DISTANCE_M[0] if stream.chance(0.3) else _FAR_M, DISTANCE_M[1])
         beside = math.radians(stream.uniform(-_MOST_BESIDE_NORMAL_DEG, _MOST_BESIDE_NORMAL_DEG))
         spot = target.after(Pose(distance * math.sin(beside), distance * math.cos(beside), 0.0))
         x, y = round(spot.x_m, 4), round(spot.y_m, 4)
