@@ -87,7 +87,7 @@ def _quantities(one: Measured) -> Iterator[tuple[str, Sequence[float], int]]:
 
 
 def _shares(rows: Sequence[Row]) -> Iterator[tuple[str, str, float]]:
-    columns = {
+    columns: Mapping[str, list[str]] = {
         "layout": [row.scene.layout or "" for row in rows],
         "kind": [row.door_kind or row.scene_kind for row in rows],
         "doors": [str(1 + len(row.other_doors)) if row.scene.door else "0" for row in rows],

@@ -38,7 +38,8 @@ def draw_furniture(stream: Stream, plan: Plan, obstacles: list[Box]) -> tuple[It
         for _ in range(_TRIES):
             new = _draw_group(stream, plan, group)
             boxes = [box for item in new for box in item_boxes(item)]
-            if not collide(boxes, taken, 0.0):
+            inside = all(plan.contains(item.x_m, item.y_m) for item in new)
+            if inside and not collide(boxes, taken, 0.0):
                 items += new
                 taken += boxes
                 break
@@ -52,7 +53,8 @@ def _draw_group(stream: Stream, plan: Plan, group: _Group) -> list[Item]:
         stream.uniform(0.3, width - 0.3),
         math.radians(stream.uniform(-180, 180, 1) if stream.chance(0.3) else 90.0 * stream.integer(0, 3)),
     )
-    wall = stream.integer(0, 3)
+    walls = [number for number in range(4) if plan.layout.has_wall[number]]
+    wall = stream.choice(dict.fromkeys(walls, 1.0))
     along = stream.uniform(0.3, plan.layout.wall_length_m(wall) - 0.3)
     at_wall = plan.on_wall(wall, along)
     match group:

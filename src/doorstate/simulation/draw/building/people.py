@@ -31,7 +31,9 @@ def draw_people(
             person = _draw_person(stream, plan, camera, target_m)
             boxes = person_boxes(person)
             near = math.dist((person.x_m, person.y_m), camera.pose[:2]) < _FROM_CAMERA_M
-            if not near and not collide(boxes, taken, 0.0):
+            if near or not plan.contains(person.x_m, person.y_m):
+                continue
+            if not collide(boxes, taken, 0.0):
                 people.append(person)
                 taken += boxes
                 break

@@ -87,6 +87,10 @@ class Plan(NamedTuple):
         highs = [*(one.along_m - _edge_m(one) for one in openings), self.layout.wall_length_m(wall)]
         return [(low, high) for low, high in zip(lows, highs, strict=True) if high > low]
 
+    def contains(self, x_m: float, y_m: float) -> bool:
+        """Return True if a place is in the room."""
+        return 0.0 < x_m < self.layout.length_m and 0.0 < y_m < self.layout.width_m
+
     def on_wall(self, wall: int, along_m: float) -> Pose:
         """Return the frame of a place on a wall."""
         return self.layout.wall_frame(wall).after(Pose(along_m, 0.0, 0.0))

@@ -33,11 +33,8 @@ from doorstate.types import Part
 _TRIES, _CAMERA_TRIES = 200, 5
 RANGE_M = (0.4, 5.0)
 LEAST_MEASURED = 0.4  # of the rays, within the range
-LEAST_DOOR, USUAL_DOOR = (
-    0.012,
-    0.07,
-)  # shares of the rays that a door in view needs; the second in most scenes
-_USUAL_CHANCE = 0.6
+LEAST_DOOR, USUAL_DOOR = 0.012, 0.05  # shares of the rays that a door in view needs
+_USUAL_CHANCE = 0.6  # of the second
 LEAST_SHOWN = 0.4  # of the outline of what a view without a door is about
 _MOST_BESIDE_NORMAL_DEG = 88.0
 
