@@ -9,12 +9,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
+
 from doorstate._documents import read_json
 from doorstate.clouds.augmentation import Augmentation
 from doorstate.evaluation.heads import head_errors, head_rows, score_four_labels, with_finder
 from doorstate.evaluation.method_scores import MACRO, score_states
 from doorstate.evaluation.results import Results
-from doorstate.networks.card import HeadErrors, WeightsCard
+from doorstate.networks.card import Guarantee, HeadErrors, WeightsCard
 from doorstate.networks.door_calibration import DoorCalibration
 from doorstate.training.run_folder import RunFolder
 from doorstate.types import STATES
@@ -34,7 +36,8 @@ class Evidence:
         comparisons: published results to show on the card.
         errors: standard errors of the heads; None where they were not measured.
         door_calibration: probability of a door by network and finder; None for whole clouds.
-        named: share of tested doors that are given a state, and share of these that is correct; None without threshold.
+        guarantee: largest share of wrong answers; None without one.
+        answers: counts of tested doors by stratum (`evaluation.answers`); None without threshold.
     """
 
     temperature: float
@@ -44,7 +47,8 @@ class Evidence:
     comparisons: tuple[Results, ...]
     errors: HeadErrors | None = None
     door_calibration: DoorCalibration | None = None
-    named: tuple[float, float] | None = None
+    guarantee: Guarantee | None = None
+    answers: pd.DataFrame | None = None
 
 
 @dataclass(frozen=True)
@@ -99,6 +103,8 @@ def model_card(path: Path, card: WeightsCard, parameters: int, training: Trainin
             "sha256": hashlib.sha256(data).hexdigest(),
             "training": training,
             "augmentation": augmentation,
+            "corruption": training.recipe.get("corruption", {}),
+            "answers": None if evidence.answers is None else evidence.answers.to_dict("records"),
             "evidence": evidence,
             "states": STATES,
             "scores": [_scores(results, card.network) for results in evidence.comparisons],

@@ -3,19 +3,25 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
+import pandas as pd
 import pytest
 from paper.publish import publish
-from paper.weights import WRONG_SHARE, package_weights
+from paper.weights import GUARANTEED_SHARE, WRONG_SHARE, choose_threshold, package_weights
 
 from doorstate.dataset.splits import draw_splits, write_splits
 from doorstate.dataset.store import PreparedDataset
 from doorstate.evaluation.calibration import labels_and_probabilities
 from doorstate.evaluation.predictions import load_results
+from doorstate.evaluation.results import Results
 from doorstate.inference.predictor import Predictor
+from doorstate.networks.card import Guarantee, WeightsCard
 from doorstate.networks.card_file import read_card
 from doorstate.training.calibration import at_temperature
 from doorstate.training.comparison import compare, prepare_comparison
@@ -112,6 +118,47 @@ def test_weights_with_a_test_of_their_own(folders: Path, scene_dataset: Prepared
     named = scaled.max(axis=1) >= card.abstain_below
     assert wrong[named].sum() <= WRONG_SHARE * named.sum()
     assert not wrong.any() or card.abstain_below > 0
-    assert len(path.with_suffix(".md").read_text(encoding="utf-8").splitlines()) <= 60
+    assert card.guarantee is None, "a few scenes guarantee nothing"
+    text = path.with_suffix(".md").read_text(encoding="utf-8")
+    assert len(text.splitlines()) <= 90
+    tested = load_results(runs / "mixture").tested
+    assert f"| all |  | {len(tested)} |" in text
     prediction = Predictor.load(path, gate=None)(scene_dataset.raw_cloud(0))
     assert prediction.opening_angle_deg is not None
+
+
+@pytest.mark.parametrize(("scenes", "guaranteed"), [(400, True), (100, False)])
+def test_enough_scenes_guarantee_the_threshold(scenes: int, guaranteed: bool) -> None:
+    """Two samples a scene, all right: they count once."""
+    rows = pd.DataFrame(
+        {
+            "method": "pointnet",
+            "role": "val",
+            "state": "open",
+            "scene_id": [f"s{index // 2}" for index in range(2 * scenes)],
+            "p_closed": 0.0,
+            "p_semi_open": 0.05,
+            "p_open": 0.95,
+        }
+    )
+    threshold, guarantee = choose_threshold(
+        cast(Results, SimpleNamespace(joined=rows)), "pointnet", 1.0, None
+    )
+    assert (guarantee is not None) == guaranteed
+    if guarantee is not None:
+        assert (guarantee.scenes, guarantee.answered, guarantee.wrong) == (scenes, scenes, 0)
+        assert guarantee.wrong_share == GUARANTEED_SHARE
+        assert 0 < threshold < 0.95
+    else:
+        assert threshold == 0, "chosen by counting: nothing is wrong"
+
+
+def test_cards_without_a_guarantee_still_load() -> None:
+    card = WeightsCard(network="pointnet", num_points=128)
+    stored = json.loads(card.model_dump_json())
+    del stored["guarantee"]
+    assert WeightsCard.parse(json.dumps(stored)) == card
+    promised = card.model_copy(
+        update={"guarantee": Guarantee(wrong_share=0.02, confidence=0.9, scenes=400, answered=300, wrong=1)}
+    )
+    assert WeightsCard.parse(promised.model_dump_json()) == promised

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import re
-from typing import Any, Self
+from typing import Any, Literal, Self
 
 from pydantic import Field, ValidationError
 
@@ -32,6 +32,20 @@ class HeadErrors(FrozenModel):
     angle_deg: dict[str, float] = Field(default_factory=dict)  # by state
 
 
+class Guarantee(FrozenModel):
+    """Largest share of wrong answers in scenes that are drawn as the validation scenes were.
+
+    It holds for the states that are given to doors among the finder's candidates, all kinds of doors together.
+    """
+
+    method: Literal["learn-then-test"] = "learn-then-test"  # training.guarantee
+    wrong_share: float = Field(gt=0, lt=1)
+    confidence: float = Field(gt=0, lt=1)  # probability, over the draw of the scenes, that it holds
+    scenes: int = Field(ge=1)  # one sample of each
+    answered: int = Field(ge=0)  # of these samples
+    wrong: int = Field(ge=0)  # of the answered ones
+
+
 class WeightsCard(FrozenModel):
     """Network, preparation of clouds, calibration and origin of a weights file."""
 
@@ -49,6 +63,7 @@ class WeightsCard(FrozenModel):
     # Logits are divided by it (training.calibration).
     temperature: float = Field(default=1.0, ge=1e-3, le=1e3)
     abstain_below: float = Field(default=0.0, ge=0, lt=1)  # abstain if no state is more probable
+    guarantee: Guarantee | None = None  # of `abstain_below`; None: chosen by counting, without one
     errors: HeadErrors | None = None  # on validation doors; None: not measured
     # Of crops, with the finder's score; None: the head `door` counts as it is.
     door_calibration: DoorCalibration | None = None
