@@ -154,11 +154,13 @@ def sensors(
     """Compare noise, steps, shadows and missing pixels of the sensor models with published figures."""
     from doorstate.cli.progress import progress_bar
 
+    from .optical_sensors import NOTE, TITLE, measure_optical
     from .sensors import measure_sensors, sensors_table
 
     with progress_bar("sensors") as progress:
         table = sensors_table(measure_sensors(range(frames), progress))
-    _write(table, out / "sensors.md", frames=frames)
+    optical = sensors_table(list(measure_optical(range(frames))), TITLE, NOTE)
+    _write((table, optical), out / "sensors.md", frames=frames)
 
 
 @app.command()

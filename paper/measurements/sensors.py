@@ -16,8 +16,8 @@ from doorstate._jobs import Progress
 from doorstate.evaluation.table import Table
 from doorstate.io.camera import Intrinsics
 from doorstate.simulation.camera import CameraPose
-from doorstate.simulation.noise.model import SensorModel, distort
-from doorstate.simulation.noise.sensors import SENSORS
+from doorstate.simulation.noise.model import Model, SensorModel, distort
+from doorstate.simulation.noise.sensors import STAGE_SENSORS as SENSORS
 from doorstate.simulation.render import incidence, is_made_of, render, render_behind_glass
 from doorstate.simulation.scene import Box, Material
 from doorstate.types import DepthImage, Part
@@ -25,9 +25,13 @@ from doorstate.types import DepthImage, Part
 DEPTHS_M = (1.0, 2.0, 3.0, 3.5, 5.0)
 TILTS_DEG = (62.0, 70.0, 75.0, 80.0, 84.0)
 AHEAD = CameraPose(0.0, 0.0, 0.0, 0.0)
-_STAGES = set(SensorModel.model_fields) - {"name", "camera"}
+_STAGES = set(SensorModel.model_fields) - {"kind", "name", "camera"}
 _FAR_M = 100.0
 _Seeds = Sequence[int]
+_NOTE = (
+    "On rendered walls, without the limits of the range. Axial noise is that of the whole output with its "
+    "rounding; for deepdoors2 it is that before depth is rounded to 1/16 m."
+)
 
 
 class SensorResult(NamedTuple):
@@ -78,13 +82,13 @@ def wall(depth_m: float, tilt_deg: float = 0.0, material: Material = "matte") ->
     return Box(Part.WALL, center, (1.0, 2 * _FAR_M, 2 * _FAR_M), tilt, material)
 
 
-def cropped(model: SensorModel, width: int, height: int) -> Intrinsics:
+def cropped(model: Model, width: int, height: int) -> Intrinsics:
     """Return the camera of the middle of the model's image."""
     middle = (width - 1) / 2, (height - 1) / 2
     return replace(model.camera.intrinsics(), width=width, height=height, cx=middle[0], cy=middle[1])
 
 
-def measure_depth(model: SensorModel, boxes: Sequence[Box], pinhole: Intrinsics, seeds: _Seeds) -> DepthImage:
+def measure_depth(model: Model, boxes: Sequence[Box], pinhole: Intrinsics, seeds: _Seeds) -> DepthImage:
     """Return (seeds, H, W) measured depth in metres, without the limits of the sensor's range."""
     rendered = render_behind_glass(boxes, AHEAD, pinhole)
     return np.stack([distort(model, rendered, boxes, AHEAD, pinhole, seed).depth_m for seed in seeds])
@@ -101,7 +105,9 @@ def measure_sensors(seeds: _Seeds, progress: Progress) -> list[SensorResult]:
     return results
 
 
-def sensors_table(results: Sequence[SensorResult]) -> Table:
+def sensors_table(
+    results: Sequence[SensorResult], title: str = "Sensor models and published figures", note: str = _NOTE
+) -> Table:
     """Return one row per published figure."""
     lines = tuple(
         (
@@ -116,11 +122,10 @@ def sensors_table(results: Sequence[SensorResult]) -> Table:
         for result in results
     )
     return Table(
-        "Sensor models and published figures",
+        title,
         ("sensor", "quantity", "condition", "unit", "published", "measured", "deviation, %"),
         lines,
-        "On rendered walls, without the limits of the range. Axial noise is that of the whole output with its "
-        "rounding; for deepdoors2 it is that before depth is rounded to 1/16 m.",
+        note,
         text_columns=4,
     )
 

@@ -81,7 +81,9 @@ def test_rows_of_all_presets_replay_bit_for_bit_in_any_order(tmp_path: Path) -> 
     assert without_door == 4
 
 
-@pytest.mark.parametrize("sensor", ["gaussian:0.02", "xtion", "kinect", "d435", "deepdoors2"])
+@pytest.mark.parametrize(
+    "sensor", ["gaussian:0.02", "xtion", "kinect", "d435", "deepdoors2", "oak-d-pro", "kinect-2"]
+)
 def test_rows_with_sensor_noise_replay_bit_for_bit(tmp_path: Path, sensor: str) -> None:
     rows = [
         *simulate_rows(small("ogurob"), 0, 700, sensor)[0],
@@ -95,7 +97,11 @@ def test_rows_with_sensor_noise_replay_bit_for_bit(tmp_path: Path, sensor: str) 
         depth_m = replay(again).cut.depth_m
         assert hashlib.sha256(depth_m.tobytes()).hexdigest() == row.depth_sha256
     assert len({row.depth_sha256 for row in rows}) == 6
-    own = find_sensor(sensor).camera
+    # The samples of a pose are measured in the same light.
+    assert len({(row.pose_id, row.conditions) for row in rows}) == 2
+    model = find_sensor(sensor)
+    assert all((row.conditions is None) == (model.kind == "stages") for row in rows)
+    own = model.camera
     assert all(row.camera == (SMALL if own == DepthCamera() else own) for row in rows)
 
 

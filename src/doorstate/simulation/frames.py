@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from doorstate.io.depth import depth_coordinates
+from doorstate.simulation.noise.conditions import INDOORS
 from doorstate.simulation.noise.model import sense
 from doorstate.simulation.noise.sensors import find_sensor
 from doorstate.simulation.noise.streams import sample_seed
@@ -39,7 +40,8 @@ def replay_pose(rows: Sequence[Row]) -> list[Frame]:
     frames = []
     for row, boxes, full in zip(rows, states, render_states(states, pose, intrinsics), strict=True):
         seed = sample_seed(row.seed, row.sample_id)
-        cut = sense(find_sensor(row.sensor), full, boxes, pose, camera, seed)
+        conditions = row.conditions or INDOORS
+        cut = sense(find_sensor(row.sensor), full, boxes, pose, camera, seed, conditions)
         x_y_z = depth_coordinates(cut.depth_m, intrinsics)
         frames.append(Frame(full, cut, level(np.moveaxis(x_y_z, 0, -1), pose.pitch_rad, pose.roll_rad)))
     return frames

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from doorstate.simulation.camera import DepthCamera
 from doorstate.simulation.frames import Frame, depth_sha256, replay_pose
+from doorstate.simulation.noise.model import conditions_for
 from doorstate.simulation.noise.sensors import find_sensor
 from doorstate.simulation.occlusion import DoorView, occluded_bin
 from doorstate.simulation.presets import Preset, draw_rows
@@ -42,11 +43,15 @@ def simulate_rows(
 def with_sensor(row: Row, sensor: str) -> Row:
     """Return the row for this sensor, with the sensor's own camera unless that is the default camera.
 
+    Samples of one pose have the same conditions.
+
     Raises:
         ConfigError: no such sensor.
     """
-    camera = find_sensor(sensor).camera
-    return row.model_copy(update={"sensor": sensor} | ({} if camera == DepthCamera() else {"camera": camera}))
+    model = find_sensor(sensor)
+    update = {"sensor": sensor, "conditions": conditions_for(model, row.seed, row.pose_id)}
+    own_camera = {} if model.camera == DepthCamera() else {"camera": model.camera}
+    return row.model_copy(update=update | own_camera)
 
 
 def _same_images(row: Row, image: Render, rows: list[Row], images: list[Render]) -> str:

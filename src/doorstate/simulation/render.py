@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,10 +93,53 @@ def _rendered(buffer: ZBuffer, boxes: Sequence[Box]) -> Render:
     return Render(buffer.depth_m.astype(np.float32), parts.take(box, mode="wrap"), box, buffer.face.copy())
 
 
+def face_normals(boxes: Sequence[Box], pose: CameraPose) -> NDArray[np.float64]:
+    """Return the unit normal of each face in the camera's frame, up to its sign: (3, codes) forward, left and up.
+
+    A column is a code of `Render.face`; `NOTHING` is -1 and so indexes the last one, which is 0. Columns of capsules
+    mean nothing.
+    """
+    # One code for each axis of a box, and one that is left out.
+    normals = np.zeros((len(boxes) + 1, 4, 3))
+    normals[:-1, :3] = place_boxes(boxes, pose).rotation
+    return normals.reshape(-1, 3).T.copy()
+
+
+def against_normal(
+    rendered: Render,
+    boxes: Sequence[Box],
+    pose: CameraPose,
+    intrinsics: Intrinsics,
+    dtype: type[np.floating[Any]] = np.float64,
+) -> NDArray[Any]:
+    """Return the component (H, W) of each ray, 1 long ahead, along the normal of the surface it hits.
+
+    Divided by the ray's length it is the cosine of the angle of incidence; where nothing is hit it means nothing.
+    """
+    assert rendered.face is not None
+    forward, to_left, to_up = face_normals(boxes, pose).astype(dtype)
+    face = rendered.face.astype(np.intp)
+    left, up = (slope.astype(dtype) for slope in ray_slopes(intrinsics))
+    component: NDArray[Any] = to_left.take(face, mode="wrap")
+    component *= left
+    component += forward.take(face, mode="wrap")
+    rise = to_up.take(face, mode="wrap")
+    rise *= up
+    component += rise
+    if capsules := capsule_numbers(boxes, range(len(boxes))):
+        placed = place_boxes(boxes, pose)
+    for number in capsules:
+        hits = cast_capsule(placed, number, intrinsics)
+        seen = box_of(rendered.face[hits.rows, hits.columns]) == number
+        np.copyto(component[hits.rows, hits.columns], hits.slope, where=seen, casting="same_kind")
+    np.abs(component, out=component)
+    return component
+
+
 def incidence(
     rendered: Render, boxes: Sequence[Box], pose: CameraPose, intrinsics: Intrinsics
 ) -> NDArray[np.float32]:
-    """Return the angle between each pixel's ray and the normal of the face it hits, exact from the box.
+    """Return the angle between each pixel's ray and the normal of the surface it hits, exact from the box.
 
     Args:
         rendered: result of a rendering of the same boxes, before or after `cut_range`.
@@ -107,27 +150,10 @@ def incidence(
     Returns:
         (H, W) float32 radians in [0, pi / 2]; 0 where nothing is hit.
     """
-    assert rendered.face is not None
-    # Rows of codes: one for each axis of a box, and one that is left out. NOTHING is -1 and so indexes the last row.
-    normals = np.zeros((len(boxes) + 1, 4, 3))
-    placed = place_boxes(boxes, pose)
-    normals[:-1, :3] = placed.rotation
-    forward, to_left, to_up = normals.reshape(-1, 3).T.copy()
-    face = rendered.face.astype(np.intp)
+    cosine = against_normal(rendered, boxes, pose, intrinsics)
     left, up = ray_slopes(intrinsics)
-    cosine = to_left.take(face, mode="wrap")
-    cosine *= left
-    cosine += forward.take(face, mode="wrap")
-    rise = to_up.take(face, mode="wrap")
-    rise *= up
-    cosine += rise
-    for number in capsule_numbers(boxes, range(len(boxes))):
-        hits = cast_capsule(placed, number, intrinsics)
-        seen = box_of(rendered.face[hits.rows, hits.columns]) == number
-        np.copyto(cosine[hits.rows, hits.columns], hits.slope, where=seen)
-    np.abs(cosine, out=cosine)
     cosine /= np.sqrt(1 + left * left + up * up)
-    angle = np.arccos(cosine, out=cosine).astype(np.float32)
+    angle: NDArray[np.float32] = np.arccos(cosine, out=cosine).astype(np.float32)
     np.copyto(angle, np.float32(0), where=rendered.box == NO_BOX)
     return angle
 

@@ -12,6 +12,7 @@ from doorstate._documents import parse_json
 from doorstate._models import Degrees, FrozenModel, Metres, Seed
 from doorstate.errors import DatasetError
 from doorstate.simulation.camera import CameraPose, DepthCamera
+from doorstate.simulation.noise.conditions import Conditions
 from doorstate.simulation.scene.box import Box
 from doorstate.simulation.scene.door import Opening
 from doorstate.simulation.scene.scene import BoxGroups, Scene, box_groups
@@ -58,6 +59,7 @@ class Row(FrozenModel):
     door_yaw_deg: Degrees | None = None
     seed: Seed
     sensor: str = "none"  # a name for noise.sensors.find_sensor
+    conditions: Conditions | None = None  # of sensors that depend on them
     camera: DepthCamera
     scene: Scene
     other_doors: tuple[OtherDoor, ...] = Field(default=(), max_length=20)

@@ -81,6 +81,33 @@ class StereoAxial(FrozenModel):
         return depth_m * depth_m * np.float32(self.disparity_px / (focal_px * self.baseline_m))
 
 
+class FlightAxial(FrozenModel):
+    """Time of flight as Fankhauser et al. 2015 measured the Kinect v2: s = a - b z + c z^2, plus
+    d z^1.5 t^2 / (pi / 2 - t)^2 at incidence t.
+    """
+
+    kind: Literal["flight"] = "flight"
+    base_m: float = 0.0015
+    linear: float = -0.0005
+    square_per_m: float = 0.0003
+    steep_m: float = 0.0001
+
+    def sigma_m(
+        self, depth_m: DepthImage, incidence_rad: NDArray[np.float32], focal_px: float
+    ) -> NDArray[np.float32]:
+        """Return the standard deviation as `ConstantAxial.sigma_m` does; constant beyond 85 degrees."""
+        sigma = depth_m * np.float32(self.square_per_m)
+        sigma += np.float32(self.linear)
+        sigma *= depth_m
+        sigma += np.float32(self.base_m)
+        steep = np.flatnonzero(incidence_rad)
+        angle = np.minimum(incidence_rad.ravel()[steep], _STEEPEST_RAD)
+        ratio = angle / (np.float32(math.pi / 2) - angle)
+        depth = depth_m.ravel()[steep]
+        sigma.ravel()[steep] += np.float32(self.steep_m) * depth * np.sqrt(depth) * ratio * ratio
+        return sigma
+
+
 Axial = ConstantAxial | NguyenAxial | StereoAxial
 
 

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TypeVar
+from typing import Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,11 +13,15 @@ from doorstate._models import FrozenModel
 from doorstate.io.camera import Intrinsics
 from doorstate.simulation.camera import CAMERAS, CameraPose, DepthCamera
 from doorstate.simulation.noise.axial import Axial, add_noise
+from doorstate.simulation.noise.conditions import INDOORS, Conditions, draw_conditions
 from doorstate.simulation.noise.dropout import Grazing, Speckle, lose_grazing, lose_speckle
 from doorstate.simulation.noise.edges import Edges, blur_edges
+from doorstate.simulation.noise.flight.model import FlightModel
 from doorstate.simulation.noise.ghosts import Ghosts, add_ghosts
 from doorstate.simulation.noise.lateral import Lateral, draw_moves
+from doorstate.simulation.noise.matching.model import MatchingModel
 from doorstate.simulation.noise.materials import Materials, lose_patches, loss_shares
+from doorstate.simulation.noise.optical import View
 from doorstate.simulation.noise.quantisation import (
     DepthSteps,
     DisparitySteps,
@@ -35,8 +39,9 @@ _ANGLE_STEPS = np.float32(2**14)  # per radian
 
 
 class SensorModel(FrozenModel):
-    """A camera and its stages in the order of the fields; None leaves a stage out."""
+    """A camera and its stages in the order of the fields, with noise of each pixel alone; None leaves a stage out."""
 
+    kind: Literal["stages"] = "stages"
     name: str
     camera: DepthCamera = CAMERAS["xtion-gazebo"]
     materials: Materials | None = None
@@ -66,13 +71,24 @@ class SensorModel(FrozenModel):
         return sigma
 
 
+Model = SensorModel | MatchingModel | FlightModel
+
+
+def conditions_for(model: Model, seed: int, scene: str) -> Conditions | None:
+    """Return the conditions of a scene (`draw_conditions`); None for sensors that do not depend on them."""
+    if model.kind == "stages":
+        return None
+    return draw_conditions(seed, scene, model.emitter.off_share if model.emitter else 1.0)
+
+
 def sense(
-    model: SensorModel,
+    model: Model,
     rendered: Render,
     boxes: Sequence[Box],
     pose: CameraPose,
     camera: DepthCamera,
     seed: int,
+    conditions: Conditions = INDOORS,
 ) -> Render:
     """Return the sensor's measurement of a rendering, cut to the camera's range.
 
@@ -83,14 +99,35 @@ def sense(
         pose: camera in the door frame.
         camera: camera of the model, or another one.
         seed: seed of the sample (`streams.sample_seed`).
+        conditions: light on the scene; a `SensorModel` does not depend on it.
 
     Returns:
         Depth NaN, part NONE and box NO_BOX where nothing is measured; at ragged edges parts move with the depth.
     """
-    return cut_range(distort(model, rendered, boxes, pose, camera.intrinsics(), seed), camera)
+    return cut_range(distort(model, rendered, boxes, pose, camera.intrinsics(), seed, conditions), camera)
 
 
 def distort(
+    model: Model,
+    rendered: Render,
+    boxes: Sequence[Box],
+    pose: CameraPose,
+    intrinsics: Intrinsics,
+    seed: int,
+    conditions: Conditions = INDOORS,
+) -> Render:
+    """Return the measurement before the range is cut: inf where the ray hits nothing, NaN where a pixel is lost.
+
+    Arguments are those of `sense`. A lost pixel stays lost in every later stage.
+    """
+    if model.kind != "stages":
+        # Lost and missing pixels divide by zero and infinity on their way through the images.
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            return model.distort(View(rendered, boxes, pose, intrinsics, seed, conditions))
+    return _through_stages(model, rendered, boxes, pose, intrinsics, seed)
+
+
+def _through_stages(
     model: SensorModel,
     rendered: Render,
     boxes: Sequence[Box],
@@ -98,10 +135,6 @@ def distort(
     intrinsics: Intrinsics,
     seed: int,
 ) -> Render:
-    """Return the measurement before the range is cut: inf where the ray hits nothing, NaN where a pixel is lost.
-
-    Arguments are those of `sense`. A lost pixel stays lost in every later stage.
-    """
     angle_rad = _incidence(model, rendered, boxes, pose, intrinsics)
     if model.materials is not None:
         shares = loss_shares(model.materials, rendered, angle_rad, boxes)

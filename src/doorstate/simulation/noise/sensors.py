@@ -10,9 +10,11 @@ from doorstate.simulation.camera import CAMERAS, DepthCamera
 from doorstate.simulation.noise.axial import ConstantAxial, NguyenAxial, StereoAxial
 from doorstate.simulation.noise.dropout import Grazing, Speckle
 from doorstate.simulation.noise.edges import Edges
+from doorstate.simulation.noise.flight.sensors import FLIGHT_SENSORS
 from doorstate.simulation.noise.lateral import Lateral
+from doorstate.simulation.noise.matching.sensors import MATCHING_SENSORS
 from doorstate.simulation.noise.materials import Materials
-from doorstate.simulation.noise.model import SensorModel
+from doorstate.simulation.noise.model import Model, SensorModel
 from doorstate.simulation.noise.quantisation import DepthSteps, DisparitySteps
 from doorstate.simulation.noise.shadow import SecondView
 
@@ -68,7 +70,7 @@ _DEEPDOORS2 = _D435.model_copy(
     }
 )
 _DEFAULT_GAUSSIAN_M = 0.01
-SENSORS = {
+STAGE_SENSORS = {
     model.name: model
     for model in (
         SensorModel(name="none"),
@@ -80,9 +82,14 @@ SENSORS = {
         _DEEPDOORS2,
     )
 }
+"""Sensors whose pixels have noise of their own; published data sets hold these."""
+SENSORS: dict[str, Model] = {
+    **STAGE_SENSORS,
+    **{model.name: model for model in (*MATCHING_SENSORS, *FLIGHT_SENSORS)},
+}
 
 
-def find_sensor(name: str) -> SensorModel:
+def find_sensor(name: str) -> Model:
     """Return a model by name; `gaussian:0.02` has a standard deviation of 0.02 m.
 
     Raises:

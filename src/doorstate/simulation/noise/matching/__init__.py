@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Sensors that match windows of pixels between two views: structured light and stereo."""
