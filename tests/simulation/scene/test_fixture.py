@@ -53,7 +53,7 @@ def test_a_fixture_fills_its_outline(kind: FixtureKind) -> None:
         (1.4, 2.6), abs=0.2 if kind in ("radiator", "handrail", "panels") else 0.011
     )
     assert high[2] == pytest.approx(2.6 if kind == "round_column" else 2.0, abs=0.01)
-    part = Part.WALL if kind in ("column", "round_column", "partition") else Part.OTHER
+    part = Part.WALL if kind in ("column", "round_column") else Part.OTHER
     assert {box.part for box in boxes} == {part}
     for number, box in enumerate(boxes):
         assert kind == "cupboard" or not collide([box], boxes[:number], 1e-6)
@@ -94,3 +94,8 @@ def test_a_balustrade_stands_on_the_side_it_is_asked_for() -> None:
     assert all(box.center_m[0] == pytest.approx(-0.55) for box in rails)
     assert max(box.center_m[2] + box.size_m[2] / 2 for box in rails) == pytest.approx(5 * 0.17 + 0.9 + 0.17)
     assert math.isclose(stairs.length_m, 1.4)
+    down = stairs.model_copy(update={"rise_m": -0.17})
+    guard = [box for box in stairs_boxes(down) if box.size_m[0] < 0.08]
+    assert len(guard) == 10
+    assert all(box.center_m[0] == pytest.approx(-0.65) for box in guard)  # on the floor beside the hole
+    assert {round(box.center_m[2], 6) for box in guard} == {0.45, 0.925}

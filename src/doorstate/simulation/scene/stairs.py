@@ -9,9 +9,10 @@ from pydantic import Field
 
 from doorstate._models import Degrees, FrozenModel, Metres
 from doorstate.simulation.scene.box import Box, place
+from doorstate.simulation.scene.room import FLOOR_M
 from doorstate.types import Part
 
-_BALUSTER_M, _RAIL_M = 0.02, 0.05
+_BALUSTER_M, _RAIL_M, _RAIL_HEIGHT_M = 0.02, 0.05, 0.9
 _SHAFT_M = 0.1
 
 
@@ -55,17 +56,26 @@ def stairs_boxes(stairs: Stairs) -> list[Box]:
         boxes.append(_step(stairs, start, stairs.going_m + last, deepest, top))
         for side, has_rail in zip((-1, 1), stairs.rails, strict=True):
             if has_rail:
-                boxes += _balusters(stairs, side * (stairs.width_m / 2 - _RAIL_M), start, top)
+                beside = _RAIL_M if deepest else -_RAIL_M  # of a hole, or on the steps
+                boxes += _balusters(stairs, side * (stairs.width_m / 2 + beside), start, top)
     if deepest:
-        middle, half, depth = stairs.length_m / 2, stairs.width_m / 2, -deepest
-        for side in (-1, 1):
-            x = side * (half + _SHAFT_M / 2)
-            boxes.append(
-                Box(Part.WALL, (x, middle, -depth / 2 - 0.1), (_SHAFT_M, stairs.length_m, depth - 0.2))
-            )
-        y = stairs.length_m + _SHAFT_M / 2
-        boxes.append(Box(Part.WALL, (0.0, y, -depth / 2 - 0.1), (stairs.width_m, _SHAFT_M, depth - 0.2)))
+        boxes += _shaft(stairs, -deepest)
     return place(boxes, stairs.x_m, stairs.y_m, math.radians(stairs.yaw_deg))
+
+
+def _shaft(stairs: Stairs, depth_m: float) -> list[Box]:
+    """Return the walls around a flight that leads down, below the floor: on both sides and at its end."""
+    z, height = -(FLOOR_M + depth_m) / 2, depth_m - FLOOR_M
+    boxes = [
+        Box(
+            Part.WALL,
+            (side * (stairs.width_m + _SHAFT_M) / 2, stairs.length_m / 2, z),
+            (_SHAFT_M, stairs.length_m, height),
+        )
+        for side in (-1, 1)
+    ]
+    end = (0.0, stairs.length_m + _SHAFT_M / 2, z)
+    return [*boxes, Box(Part.WALL, end, (stairs.width_m, _SHAFT_M, height))]
 
 
 def _step(stairs: Stairs, start_m: float, length_m: float, bottom_m: float, top_m: float) -> Box:
@@ -74,10 +84,9 @@ def _step(stairs: Stairs, start_m: float, length_m: float, bottom_m: float, top_
 
 
 def _balusters(stairs: Stairs, x_m: float, start_m: float, top_m: float) -> list[Box]:
-    """Return a post and a piece of rail: boxes are upright, so the rail is stepped."""
-    y, rail_z = start_m + stairs.going_m / 2, top_m + 0.9
-    post = Box(Part.OTHER, (x_m, y, (top_m + rail_z) / 2), (_BALUSTER_M, _BALUSTER_M, rail_z - top_m))
-    rail = Box(
-        Part.OTHER, (x_m, y, rail_z + abs(stairs.rise_m) / 2), (_RAIL_M, stairs.going_m, abs(stairs.rise_m))
-    )
+    """Return a post and a piece of rail: boxes are upright, so the rail is stepped; beside a hole it is level."""
+    y, foot, thickness = start_m + stairs.going_m / 2, max(top_m, 0.0), max(stairs.rise_m, _RAIL_M)
+    rail_z = foot + _RAIL_HEIGHT_M
+    post = Box(Part.OTHER, (x_m, y, (foot + rail_z) / 2), (_BALUSTER_M, _BALUSTER_M, _RAIL_HEIGHT_M))
+    rail = Box(Part.OTHER, (x_m, y, rail_z + thickness / 2), (_RAIL_M, stairs.going_m, thickness))
     return [post, rail]

@@ -36,8 +36,7 @@ CAMERA = DepthCamera(width=160, height=120)
 def test_every_layout_and_every_thing_appears() -> None:
     assert {row.scene.layout for row in ALL} == set(LAYOUTS) == set(get_args(LayoutKind))
     scenes = [row.scene for row in ALL]
-    # A partition is a shape for other users.
-    assert {one.kind for scene in scenes for one in scene.fixtures or ()} == set(FIXTURES) - {"partition"}
+    assert {one.kind for scene in scenes for one in scene.fixtures or ()} == set(FIXTURES)
     assert {one.kind for scene in scenes for one in scene.apertures or ()} == set(APERTURES)
     assert any(one.sash_deg for scene in scenes for one in scene.apertures or ())
     items = {item.kind for scene in scenes for item in scene.items}
