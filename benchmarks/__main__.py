@@ -6,6 +6,7 @@ Heavy imports happen inside the commands, because every worker process imports t
 
 from __future__ import annotations
 
+import json
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -17,6 +18,7 @@ from benchmarks.options import (
     parse_integers,
     parse_networks,
     parse_points,
+    port_checkouts,
     print_stored,
     store_results,
 )
@@ -31,7 +33,12 @@ Networks = Annotated[str, typer.Option(help="Names separated by commas, or all."
 Points = Annotated[str, typer.Option(help="Numbers of points per cloud, separated by commas.")]
 Batch = Annotated[int, typer.Option(help="Clouds per training step.", min=2)]
 Repeats = Annotated[int, typer.Option(help="Rounds of measurements.", min=1)]
+Device = Annotated[
+    str, typer.Option(metavar="DEVICE", help="Device of the networks: auto, cpu, cuda or cuda:N.")
+]
 Threads = Annotated[int, typer.Option(help="Threads of torch.", min=1)]
+PortPointNet = Annotated[Path | None, typer.Option(help="Checkout of yanx27/Pointnet_Pointnet2_pytorch.")]
+PortDGCNN = Annotated[Path | None, typer.Option(help="Checkout of antao97/dgcnn.pytorch.")]
 _ALL_POINTS = "1024,2048,4096"
 
 app = typer.Typer(
@@ -52,10 +59,8 @@ def networks(
     repeats: Repeats = 3,
     threads: Threads = 2,
     data: Annotated[Path | None, typer.Option(help="Prepared data set; default: simulated clouds.")] = None,
-    port_pointnet: Annotated[
-        Path | None, typer.Option(help="Checkout of yanx27/Pointnet_Pointnet2_pytorch.")
-    ] = None,
-    port_dgcnn: Annotated[Path | None, typer.Option(help="Checkout of antao97/dgcnn.pytorch.")] = None,
+    port_pointnet: PortPointNet = None,
+    port_dgcnn: PortDGCNN = None,
     pyg: Annotated[bool, typer.Option("--pyg", help="Measure modules of PyTorch Geometric too.")] = False,
     same_allocator: Annotated[
         bool,
@@ -64,6 +69,7 @@ def networks(
     compiled: Annotated[
         bool, typer.Option("--compiled", help="Measure the fastest form with torch.compile too.")
     ] = False,
+    device: Device = "cpu",
     fresh: Annotated[bool, typer.Option("--fresh", help="Measure stored results again.")] = False,
 ) -> None:
     """Training and inference of the five networks, beside their plain forms and public ports.
@@ -79,12 +85,13 @@ def networks(
     from benchmarks.networks import INFERENCE_BATCHES, Plan, measure_networks, table_of
     from benchmarks.networks_table import list_failures
     from benchmarks.store import Store
+    from doorstate._devices import describe_device, resolve_device
     from doorstate.cli.progress import progress_bar
 
     names, numbers_of_points = parse_networks(networks), parse_points(points)
-    ports = {"pointnet": port_pointnet, "pointnet2": port_pointnet, "dgcnn": port_dgcnn}
-    checkouts = {name: path for name, path in ports.items() if path is not None}
-    plan = Plan(batch, repeats, threads, checkouts, pyg, same_allocator, compiled)
+    checkouts = port_checkouts(port_pointnet, port_dgcnn)
+    place = resolve_device(device)
+    plan = Plan(batch, repeats, threads, checkouts, pyg, same_allocator, compiled, str(place))
     settings = describe_run(
         batch=batch,
         repeats=repeats,
@@ -94,6 +101,7 @@ def networks(
         pyg=pyg,
         same_allocator=same_allocator,
         compiled=compiled,
+        device=describe_device(place),
     )
     count, most_points = max(batch, *INFERENCE_BATCHES), max(numbers_of_points)
 
@@ -219,6 +227,45 @@ def busy(
 
 
 @app.command()
+def gpu(
+    out: Out,
+    device: Device = "cuda",
+    networks: Networks = "all",
+    port_pointnet: PortPointNet = None,
+    port_dgcnn: PortDGCNN = None,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Few small clouds, to try the check itself.")
+    ] = False,
+    minutes: Annotated[float, typer.Option(help="Leave out what would start later.", min=0)] = 7.0,
+) -> None:
+    """Check a CUDA device: parity with the processor, times of networks, searches and rendering, in gpu.json.
+
+    The exit code is 1 if something failed or a network differs from that of the processor, and 77 if there is no CUDA
+    device.
+    """
+    from benchmarks.gpu import check_gpu
+    from doorstate._devices import describe_device, resolve_device
+    from doorstate._files import write_text
+    from doorstate.cli.console import stdout
+
+    try:
+        place = resolve_device(device)
+    except ConfigError as error:
+        if not device.startswith("cuda"):
+            raise
+        stdout.print(f"nothing was checked: {error.message}", soft_wrap=True)
+        raise typer.Exit(77) from None
+    names, checkouts = parse_networks(networks), port_checkouts(port_pointnet, port_dgcnn)
+    settings = describe_run(device=describe_device(place), quick=quick, ports=" ".join(checkouts))
+    results = check_gpu(place, names, checkouts, quick, minutes * 60)
+    write_text(out / "gpu.json", json.dumps({"settings": settings} | results, indent=1) + "\n")
+    wrong = [f"{row['network']} differs" for row in results["parity"] if not row["is_within_tolerance"]]
+    wrong += [f"{row['part']} of {row['name']} failed" for row in results["failed"]]
+    stdout.print(f"stored in {out / 'gpu.json'}: {', '.join(wrong) or 'all agree'}", soft_wrap=True)
+    raise typer.Exit(int(bool(wrong)))
+
+
+@app.command()
 def rules(
     out: Out,
     count: Annotated[int, typer.Option(help="Clouds, of all states.", min=1)] = 60,
@@ -261,17 +308,23 @@ def profile(
 
 
 @app.command()
-def knn(out: Out, points: Points = _ALL_POINTS, repeats: Repeats = 5, threads: Threads = 2) -> None:
+def knn(
+    out: Out, points: Points = _ALL_POINTS, repeats: Repeats = 5, threads: Threads = 2, device: Device = "cpu"
+) -> None:
     """Nearest neighbours in the feature space of DGCNN, by three methods."""
     from benchmarks.clouds import simulated_clouds
     from benchmarks.neighbours import measure_neighbours, neighbours_table
+    from doorstate._devices import describe_device, resolve_device
     from doorstate.cli.progress import progress_bar
 
-    numbers_of_points = parse_points(points)
+    numbers_of_points, place = parse_points(points), resolve_device(device)
     with progress_bar("knn") as progress:
         clouds = simulated_clouds(1, max(numbers_of_points))
-        rows = measure_neighbours(clouds, numbers_of_points, repeats, threads, progress)
-    store_results(out, "knn", rows, neighbours_table(rows), threads=threads, repeats=repeats)
+        rows = measure_neighbours(clouds, numbers_of_points, repeats, threads, progress, str(place))
+    described = describe_device(place)
+    store_results(
+        out, "knn", rows, neighbours_table(rows), threads=threads, repeats=repeats, device=described
+    )
 
 
 @app.command()

@@ -8,6 +8,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
+import torch
 from torch import Tensor, nn
 
 from benchmarks.ports import build_port
@@ -37,9 +38,9 @@ BASELINES = (PLAIN, PORT, PYG)
 PORT_OPTIONS: dict[str, dict[str, Any]] = {"dgcnn": {"k": 20}}
 
 
-def forms_of(network: str, port: bool, pyg: bool, compiled: bool = False) -> list[Form]:
+def forms_of(network: str, port: bool, pyg: bool, compiled: bool = False, device: str = "cpu") -> list[Form]:
     """Return the forms of a network in the order in which they alternate."""
-    bf16 = has_fast_bf16()
+    bf16 = has_fast_bf16(torch.device(device))
     best = "fast bf16" if bf16 else "fast fp32"
     forms = [Form("fast fp32", "fast")]
     forms += [Form("fast bf16", "fast", bf16=True)] if bf16 else []
@@ -67,7 +68,7 @@ def build_form(form: Form, network: str, checkout: Path | None, points: Tensor) 
         return plain_form(module)
     if form.compiled:
         module.__dict__["training_loss"] = compile_if_possible(module.training_loss)
-    return _WithNeighbours(module, points) if form.cached else module
+    return _WithNeighbours(module.to(points.device), points) if form.cached else module
 
 
 def plain_form(network: PointNetwork) -> nn.Module:

@@ -33,6 +33,7 @@ class NetworkTask(NamedTuple):
     threads: int
     checkout: Path | None = None  # of a port
     same_allocator: bool = False
+    device: str = "cpu"
 
 
 class MeasuredNetwork:
@@ -43,11 +44,12 @@ class MeasuredNetwork:
         if task.form.kind == "fast" or task.same_allocator:
             keep_freed_memory()
         torch.manual_seed(_SEED)
-        self._clouds = torch.from_numpy(task.clouds.points)
+        self._device = task.device
+        self._clouds = torch.from_numpy(task.clouds.points).to(task.device)
         self._points = self._clouds[: task.batch]
-        self._labels = torch.from_numpy(task.clouds.labels[: task.batch])
+        self._labels = torch.from_numpy(task.clouds.labels[: task.batch]).to(task.device)
         self._bf16 = task.form.bf16
-        self._module = build_form(task.form, task.network, task.checkout, self._points)
+        self._module = build_form(task.form, task.network, task.checkout, self._points).to(task.device)
         self._optimizer = torch.optim.AdamW(self._module.parameters(), 1e-3, weight_decay=0.05)
         self._last_s: dict[str, float] = {}
         self._memory_mib: float | None = None
@@ -55,11 +57,11 @@ class MeasuredNetwork:
     def training_seconds(self) -> float:
         """Measure a training step: loss, gradients, AdamW."""
         self._module.train()
-        before = resident_mib()
-        reset_peak()
+        before = self._memory()
+        self._reset_peak()
         seconds = self._measure("training", self.train_step)
         if self._memory_mib is None:
-            self._memory_mib = peak_resident_mib() - before
+            self._memory_mib = self._peak_memory() - before
         return seconds
 
     def memory_mib(self) -> float:
@@ -102,12 +104,28 @@ class MeasuredNetwork:
 
     def _measure(self, name: str, step: Callable[[], object]) -> float:
         # A step of several seconds needs no warm-up after the first round.
-        seconds = median_seconds(step, warm_up=self._last_s.get(name, 0.0) < _LONG_STEP_S)
+        seconds = median_seconds(
+            step, warm_up=self._last_s.get(name, 0.0) < _LONG_STEP_S, device=self._device
+        )
         self._last_s[name] = seconds
         return seconds
 
     def _autocast(self) -> AbstractContextManager[object]:
-        return torch.autocast("cpu", torch.bfloat16, enabled=self._bf16)
+        return torch.autocast(torch.device(self._device).type, torch.bfloat16, enabled=self._bf16)
+
+    def _memory(self) -> float:
+        return resident_mib() if self._device == "cpu" else torch.cuda.memory_allocated(self._device) / 2**20
+
+    def _peak_memory(self) -> float:
+        if self._device == "cpu":
+            return peak_resident_mib()
+        return torch.cuda.max_memory_allocated(self._device) / 2**20
+
+    def _reset_peak(self) -> None:
+        if self._device == "cpu":
+            reset_peak()
+        else:
+            torch.cuda.reset_peak_memory_stats(self._device)
 
 
 class OperationCount:

@@ -41,7 +41,7 @@ def full_product(features: Tensor) -> Tensor:
 
 def brute_force(features: Tensor) -> Tensor:
     """Return the neighbours by scikit-learn's brute force."""
-    rows = features[0].numpy()
+    rows = features[0].cpu().numpy()
     search = NearestNeighbors(n_neighbors=K, algorithm="brute").fit(rows)
     return torch.from_numpy(search.kneighbors(rows, return_distance=False)).unsqueeze(0)
 
@@ -54,16 +54,21 @@ METHODS: dict[str, Callable[[Tensor], Tensor]] = {
 
 
 def measure_neighbours(
-    clouds: Clouds, numbers_of_points: Sequence[int], repeats: int, threads: int, progress: Progress
+    clouds: Clouds,
+    numbers_of_points: Sequence[int],
+    repeats: int,
+    threads: int,
+    progress: Progress,
+    device: str = "cpu",
 ) -> list[Result]:
     """Return the times of every method."""
     rows = []
     torch.manual_seed(_SEED)
-    network = DGCNN(k=K).eval()
+    network = DGCNN(k=K).eval().to(device)
     with torch.inference_mode(), torch_threads(threads), threadpool_limits(threads):
         for number, num_points in enumerate(numbers_of_points):
             progress(number, len(numbers_of_points))
-            points = torch.from_numpy(clouds.first_points(num_points).points)
+            points = torch.from_numpy(clouds.first_points(num_points).points).to(device)
             order, nearest = network.neighbourhoods(points)
             first, _, third, _ = network.edge_features(gather_rows(points, order), nearest)
             for features in (first.clone(), third.clone()):
@@ -85,4 +90,7 @@ def neighbours_table(rows: Sequence[Result]) -> Table:
 
 
 def _measure_round(features: Tensor) -> dict[str, float]:
-    return {name: median_seconds(partial(method, features)) * 1000 for name, method in METHODS.items()}
+    return {
+        name: median_seconds(partial(method, features), device=str(features.device)) * 1000
+        for name, method in METHODS.items()
+    }

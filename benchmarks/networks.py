@@ -10,6 +10,8 @@ from pathlib import Path
 from statistics import median
 from typing import NamedTuple
 
+import torch
+
 from benchmarks.clouds import Clouds
 from benchmarks.forms import BASELINES, Form, forms_of
 from benchmarks.measured_network import MeasuredNetwork, NetworkTask, OperationCount
@@ -37,10 +39,11 @@ class Plan(NamedTuple):
     pyg: bool
     same_allocator: bool
     compiled: bool = False
+    device: str = "cpu"
 
     def forms(self, network: str) -> list[Form]:
         """Return the forms of a network."""
-        return forms_of(network, network in self.checkouts, self.pyg, self.compiled)
+        return forms_of(network, network in self.checkouts, self.pyg, self.compiled, self.device)
 
 
 def measure_networks(
@@ -72,7 +75,7 @@ def measure_networks(
         done += 1
         progress(done, total)
 
-    with Worker(MatrixSpeed, plan.threads) as matrix_speed:
+    with Worker(MatrixSpeed, plan.threads, plan.device) as matrix_speed:
         for network, points in missing:
             store.results[_key(network, points)] = _measure(
                 plan, network, clouds.first_points(points), matrix_speed, advance
@@ -133,7 +136,7 @@ def _measure(
 ) -> Result:
     with Worker(OperationCount, network, clouds) as counter:
         gflop = counter.call("training_gflop")
-    precisions = (False, True) if has_fast_bf16() else (False,)
+    precisions = (False, True) if has_fast_bf16(torch.device(plan.device)) else (False,)
     with ExitStack() as stack:
         measured_forms = [
             _FormRounds(
@@ -159,7 +162,9 @@ def _measure(
 
 def _task(plan: Plan, network: str, form: Form, clouds: Clouds) -> NetworkTask:
     checkout = plan.checkouts.get(network)
-    return NetworkTask(network, form, clouds, plan.batch, plan.threads, checkout, plan.same_allocator)
+    return NetworkTask(
+        network, form, clouds, plan.batch, plan.threads, checkout, plan.same_allocator, plan.device
+    )
 
 
 def _row(measured: _FormRounds, all_forms: Sequence[_FormRounds], gflop: float) -> Result:

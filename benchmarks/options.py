@@ -52,6 +52,12 @@ def parse_integers(option: str, text: str, minimum: int) -> list[int]:
     return [int(word) for word in words]
 
 
+def port_checkouts(pointnet: Path | None, dgcnn: Path | None) -> dict[str, Path]:
+    """Return the checkouts of ports that were given, by network."""
+    ports = {"pointnet": pointnet, "pointnet2": pointnet, "dgcnn": dgcnn}
+    return {name: path for name, path in ports.items() if path is not None}
+
+
 def describe_run(**options: Any) -> dict[str, Any]:
     """Return everything that results depend on: machine, versions and options."""
     from doorstate._environment import describe_environment

@@ -15,26 +15,36 @@ import numpy as np
 import torch
 
 _MIN_DURATION_S = 1.0
-_MAX_STEPS = 3
-_MATRIX_SIZE = 2048
+_MAX_STEPS, _MAX_STEPS_ON_DEVICE = 3, 10
+_MATRIX_SIZE, _MATRIX_SIZE_ON_DEVICE = 2048, 8192
 _PRODUCTS = 4
 
 
-def median_seconds(step: Callable[[], object], warm_up: bool = True) -> float:
+def median_seconds(step: Callable[[], object], warm_up: bool = True, device: str = "cpu") -> float:
     """Return the median duration of a step.
 
     Args:
-        step: run three times, or until one second has passed.
+        step: run three times, or until one second has passed; ten times on a CUDA device.
         warm_up: run it once before, without measuring.
+        device: what the step waits for.
     """
     if warm_up:
         step()
+    finish(device)
     seconds: list[float] = []
-    while len(seconds) < _MAX_STEPS and sum(seconds) < _MIN_DURATION_S:
+    most_steps = _MAX_STEPS if device == "cpu" else _MAX_STEPS_ON_DEVICE
+    while len(seconds) < most_steps and sum(seconds) < _MIN_DURATION_S:
         started = time.perf_counter()
         step()
+        finish(device)
         seconds.append(time.perf_counter() - started)
     return median(seconds)
+
+
+def finish(device: str) -> None:
+    """Wait for the work of a device."""
+    if device != "cpu":
+        torch.cuda.synchronize(device)
 
 
 @contextmanager
@@ -67,22 +77,26 @@ def format_ms(value: float) -> str:
 
 
 class MatrixSpeed:
-    """Speed of products of two 2048 x 2048 matrices, measured in a process of its own."""
+    """Speed of products of two square matrices, of 2048 rows, or 8192 on a CUDA device, in a process of its own."""
 
-    def __init__(self, threads: int) -> None:
+    def __init__(self, threads: int, device: str = "cpu") -> None:
         torch.set_num_threads(threads)
-        self._matrix = torch.randn(_MATRIX_SIZE, _MATRIX_SIZE, generator=torch.Generator().manual_seed(0))
+        self._device, self._size = device, _MATRIX_SIZE if device == "cpu" else _MATRIX_SIZE_ON_DEVICE
+        matrix = torch.randn(self._size, self._size, generator=torch.Generator().manual_seed(0))
+        self._matrix = matrix.to(device)
 
     def gflops(self, bf16: bool) -> float:
         """Return the highest of a few measurements in GFLOP/s; a multiply-add counts as two operations."""
         matrix = self._matrix.bfloat16() if bf16 else self._matrix
         matrix @ matrix
+        finish(self._device)
         seconds: list[float] = []
         for _ in range(_PRODUCTS):
             started = time.perf_counter()
             matrix @ matrix
+            finish(self._device)
             seconds.append(time.perf_counter() - started)
-        return 2 * _MATRIX_SIZE**3 / min(seconds) / 1e9
+        return 2 * self._size**3 / min(seconds) / 1e9
 
 
 def resident_mib(process: int | str = "self") -> float:

@@ -336,3 +336,39 @@ def test_service_is_measured_with_every_number_of_clients(tmp_path: Path) -> Non
         assert row["p50_ms"] <= row["p99_ms"]
         assert min(row["memory_mib"]) > 100
     assert "| 3 |" in markdown
+
+
+def test_check_of_a_gpu_runs_on_the_processor(tmp_path: Path) -> None:
+    script = REPOSITORY / "paper" / "gpu_check.sh"
+    command = [script, "--device", "cpu", "--quick", "--networks", "pointnet,dgcnn", "--out", tmp_path]
+    environment = os.environ | {"OMP_NUM_THREADS": "1", "PYTHON": sys.executable}
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+    assert done.returncode == 0, done.stderr
+    results = json.loads((tmp_path / "gpu.json").read_text(encoding="utf-8"))
+    assert results["settings"]["device"] == "cpu"
+    assert [row["network"] for row in results["parity"]] == ["pointnet", "dgcnn"]
+    assert all(row["float64"] == {"outputs": 0, "gradients": 0} for row in results["parity"])
+    assert {row["form"] for row in results["networks"]} >= {"fast fp32", "plain fp32"}
+    assert all(row["training_ms"] > 0 and row["inference_1_ms"] > 0 for row in results["networks"])
+    assert all(row["gb_per_s"] > 0 for row in results["kernels"])
+    assert results["simulation"][0]["frames_per_s"] > 0
+    assert results["failed"] == results["left_out"] == []
+
+
+def test_check_of_a_gpu_without_one(tmp_path: Path) -> None:
+    if torch.cuda.is_available():
+        pytest.skip("there is a CUDA device")
+    code, output, errors = run("gpu", "--out", tmp_path)
+    assert (code, errors, output.count("\n")) == (77, "", 1)
+    assert not any(tmp_path.iterdir())
+
+
+def test_a_network_that_differs_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    from benchmarks import gpu
+
+    points = torch.rand(4, 128, 3, generator=torch.Generator().manual_seed(0))
+    labels = torch.tensor([0, 1, 2, 0])
+    cpu = torch.device("cpu")
+    assert gpu.compare("pointnet", points, labels, cpu)["is_within_tolerance"]
+    monkeypatch.setattr(gpu, "_difference", lambda got, expected: 0.5)
+    assert not gpu.compare("pointnet", points, labels, cpu)["is_within_tolerance"]

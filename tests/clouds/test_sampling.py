@@ -6,15 +6,18 @@ from __future__ import annotations
 import itertools
 import json
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from doorstate.clouds.device_sampling import device_sampler, farthest_points
 from doorstate.clouds.preparation import CloudSpec, prepare_cloud
 from doorstate.clouds.samplers import NUMPY, Sampler, find_fpsample, find_torch_quickfps
 from doorstate.clouds.sampling import farthest_point_indices
@@ -25,7 +28,12 @@ from doorstate.simulation.presets import PRESETS, draw_rows
 from doorstate.types import Indices, Points
 
 GAZEBO = Path(__file__).resolve().parents[1] / "fixtures" / "gazebo"
-COMPILED = {"fpsample": find_fpsample, "torch-quickfps": find_torch_quickfps}
+COMPILED: dict[str, Callable[[], Sampler | None]] = {
+    "fpsample": find_fpsample,
+    "torch-quickfps": find_torch_quickfps,
+    "torch": lambda: device_sampler(torch.device("cpu")),
+    "cuda": lambda: device_sampler(torch.device("cuda")) if torch.cuda.is_available() else None,
+}
 
 
 def compiled_sampler(library: str) -> Sampler:
@@ -237,3 +245,13 @@ def test_the_order_survives_turning_mirroring_and_scaling(seed: int, scale: floa
 def test_impossible_arguments_are_refused(points: NDArray[np.float64], count: int, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         farthest_point_indices(points.astype(np.float32), count)
+
+
+def test_clouds_that_are_sampled_together_are_sampled_alone() -> None:
+    clouds = [random_cloud(seed, 200).round(1) for seed in range(3)]
+    points = torch.from_numpy(np.stack(clouds))
+    together = farthest_points(points, 30)
+    for cloud, chosen in zip(points, together, strict=True):
+        assert torch.equal(farthest_points(cloud[None], 30)[0], chosen)
+        assert chosen[0] == 0
+    assert farthest_points(points.to("meta"), 30).shape == (3, 30), "nothing waits for values"

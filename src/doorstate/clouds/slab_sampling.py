@@ -41,7 +41,7 @@ def slab_farthest_points(points: Points, count: int, height: int) -> Indices:
     # One integer orders points by distance, and equal distances by leaf order: the bits of a float32 that is not
     # negative order as integers do, and stand above the bits of N - 1 - rank. Padding is lowest of all.
     keys, keys_now = np.full((2, padded), -1, np.int64)
-    keys_now[: len(points)] = len(points) - 1 - _leaf_ranks(axes, height)[sorted_rows]
+    keys_now[: len(points)] = len(points) - 1 - leaf_ranks(axes, height)[sorted_rows]
     keys[: len(points)] = keys_now[: len(points)] | _FARTHEST
     squared, squared_now = (array.view(np.float32)[_HIGH_HALF::2] for array in (keys, keys_now))
     blocks = keys.reshape(num_blocks, _BLOCK)
@@ -70,7 +70,7 @@ def slab_farthest_points(points: Points, count: int, height: int) -> Indices:
     return rows
 
 
-def _leaf_ranks(axes: Points, height: int) -> Indices:
+def leaf_ranks(axes: Points, height: int) -> Indices:
     """Return the rank (N,) of each point in the leaves of a k-d tree that splits at the mean of the longest side.
 
     Args:
