@@ -340,13 +340,13 @@ def test_service_is_measured_with_every_number_of_clients(tmp_path: Path) -> Non
 
 def test_check_of_a_gpu_runs_on_the_processor(tmp_path: Path) -> None:
     script = REPOSITORY / "paper" / "gpu_check.sh"
-    command = [script, "--device", "cpu", "--quick", "--networks", "pointnet,dgcnn", "--out", tmp_path]
+    command = [script, "--device", "cpu", "--quick", "--networks", "pointnet", "--out", tmp_path]
     environment = os.environ | {"OMP_NUM_THREADS": "1", "PYTHON": sys.executable}
     done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
     assert done.returncode == 0, done.stderr
     results = json.loads((tmp_path / "gpu.json").read_text(encoding="utf-8"))
     assert results["settings"]["device"] == "cpu"
-    assert [row["network"] for row in results["parity"]] == ["pointnet", "dgcnn"]
+    assert [row["network"] for row in results["parity"]] == ["pointnet"]
     assert all(row["float64"] == {"outputs": 0, "gradients": 0} for row in results["parity"])
     assert {row["form"] for row in results["networks"]} >= {"fast fp32", "plain fp32"}
     assert all(row["training_ms"] > 0 and row["inference_1_ms"] > 0 for row in results["networks"])
