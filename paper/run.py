@@ -17,8 +17,13 @@ from .definition import read_definition
 from .published import comparison
 
 
-def run(name: str) -> None:
-    """Make the data of an experiment, run the experiments it starts from, and run it; finished steps are kept."""
+def run(name: str, options: str = "") -> None:
+    """Make the data of an experiment, run the experiments it starts from, and run it; finished steps are kept.
+
+    Args:
+        name: file of `paper/experiments/`, without `.toml`.
+        options: further options of the command that runs it, such as `--device cuda`.
+    """
     definition = read_definition(name)
     for start in definition.starts_from:
         if not is_finished(start):
@@ -26,7 +31,7 @@ def run(name: str) -> None:
     for dataset in definition.datasets:
         for command in dataset_commands(paths.REPOSITORY / dataset):
             run_doorstate(command.arguments, command.prepared)
-    run_doorstate(f"{definition.command} paper/experiments/{name}.toml --jobs 2")
+    run_doorstate(f"{definition.command} paper/experiments/{name}.toml --jobs 2 {options}".rstrip())
     if not definition.is_study and definition.content.get("protocol") != "all":
         run_doorstate(f"report runs/{name}")
 
