@@ -41,6 +41,17 @@ SOURCES = (
     ("no-door", "xtion", 916, 240),
     ("no-door", "d435", 917, 100),
     ("no-door", "kinect", 919, 60),
+    ("building", "xtion-matching", 941, 280),
+    ("building", "d435-matching", 942, 180),
+    ("building", "d455", 943, 120),
+    ("building", "kinect-2", 944, 80),
+    ("building", "azure-kinect", 945, 100),
+    ("building", "oak-d-pro", 946, 60),
+    ("building", "gemini-335", 947, 80),
+    ("building-no-door", "xtion-matching", 951, 140),
+    ("building-no-door", "d435-matching", 952, 90),
+    ("building-no-door", "d455", 953, 60),
+    ("building-no-door", "azure-kinect", 955, 60),
 )
 _SCENES_PER_PIECE = 20
 _MIDDLE_SIGMA_M, _END_SIGMA_M = 0.08, 0.05  # of the columns that count as a middle or an end
