@@ -100,11 +100,14 @@ class FlightAxial(FrozenModel):
         sigma += np.float32(self.linear)
         sigma *= depth_m
         sigma += np.float32(self.base_m)
-        steep = np.flatnonzero(incidence_rad)
-        angle = np.minimum(incidence_rad.ravel()[steep], _STEEPEST_RAD)
-        ratio = angle / (np.float32(math.pi / 2) - angle)
-        depth = depth_m.ravel()[steep]
-        sigma.ravel()[steep] += np.float32(self.steep_m) * depth * np.sqrt(depth) * ratio * ratio
+        angle = np.minimum(incidence_rad, _STEEPEST_RAD)
+        left = np.float32(math.pi / 2) - angle
+        angle /= left
+        angle *= angle
+        angle *= depth_m
+        angle *= np.sqrt(depth_m, out=left)
+        angle *= np.float32(self.steep_m)
+        sigma += angle
         return sigma
 
 

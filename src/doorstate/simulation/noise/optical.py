@@ -23,8 +23,11 @@ from doorstate.types import Part
 
 Image = NDArray[np.float32]
 WHITE = 0.8  # albedo of a white wall, at which reaches and noise are given
-_ANGLE_STEPS = 2**14  # per radian: processors differ in the last digits of an arc cosine
-_STEEP_COSINE = math.sqrt(0.5)
+_COSINE_STEPS = 2**14
+# Rounded to 2^-14 radians, because processors differ in the last digits of an arc cosine.
+_ANGLES = np.array(
+    [round(math.acos(step / _COSINE_STEPS) * 2**14) / 2**14 for step in range(_COSINE_STEPS + 1)], np.float32
+)
 
 # Assumed ranges of the albedo in infrared, and of the texture: 1 is what a matcher needs at least.
 _ALBEDO = {
@@ -83,13 +86,11 @@ def cosines(view: View, ray_length: Image) -> Image:
     return np.minimum(cosine, np.float32(1), out=cosine)
 
 
-def steep_angles(cosine: Image) -> Image:
-    """Return the angle of incidence (H, W) in radians beyond 45 degrees, and 0 before."""
-    angle = np.zeros(cosine.shape, np.float32)
-    steep = np.flatnonzero(cosine < np.float32(_STEEP_COSINE))
-    exact = np.arccos(cosine.ravel()[steep].astype(np.float64))
-    angle.ravel()[steep] = np.rint(exact * _ANGLE_STEPS) / _ANGLE_STEPS
-    return angle
+def angles(cosine: Image) -> Image:
+    """Return the angle of incidence (H, W) in radians from a table: exact to 0.01 degrees beyond 20, to 0.5 before."""
+    entry = cosine * np.float32(_COSINE_STEPS)
+    entry += np.float32(0.5)
+    return _ANGLES.take(entry.astype(np.int32))
 
 
 class Surfaces(NamedTuple):

@@ -20,19 +20,19 @@ from doorstate.simulation.noise.optical import (
     Emitter,
     Image,
     View,
+    angles,
     cosines,
     dimming,
     draw_surfaces,
     ray_lengths,
     received,
-    steep_angles,
 )
 from doorstate.simulation.noise.quantisation import DepthSteps, round_depth
 from doorstate.simulation.noise.returns import Returns, reflect
 from doorstate.simulation.noise.windows import correlated_noise
 from doorstate.simulation.render import Render
 
-_NOISIEST = 20.0  # assumed: measurements with more than this times the noise on a white wall are lost
+_NOISIEST = 20.0  # assumed: noise is at most this times that on a white wall
 
 
 class FlightModel(FrozenModel):
@@ -83,7 +83,7 @@ class FlightModel(FrozenModel):
 
     def sigma_m(self, depth_m: Image, albedo: Image, cosine: Image, view: View) -> Image:
         """Return the standard deviation (H, W): that of a white wall, more on darker surfaces and in sunlight."""
-        sigma = self.axial.sigma_m(depth_m, steep_angles(cosine), view.intrinsics.fx)
+        sigma = self.axial.sigma_m(depth_m, angles(cosine), view.intrinsics.fx)
         # Shot noise of the ambient light grows with its root.
         scale = np.float32(WHITE * dimming(self.emitter, view.conditions) ** 0.5)
         sigma *= np.minimum(scale / np.maximum(albedo, np.float32(0.01)), np.float32(_NOISIEST))

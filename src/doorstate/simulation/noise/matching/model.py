@@ -19,11 +19,11 @@ from doorstate.simulation.noise.optical import (
     Emitter,
     Image,
     View,
+    angles,
     cosines,
     draw_surfaces,
     ray_lengths,
     received,
-    steep_angles,
 )
 from doorstate.simulation.noise.returns import Returns, reflect
 from doorstate.simulation.noise.windows import correlated_noise
@@ -88,7 +88,7 @@ class MatchingModel(FrozenModel):
         if self.axial.kind == "stereo":
             return np.float32(max(self.axial.disparity_px**2 - rounding, 0) ** 0.5)
         depth_m: Image = np.divide(scale, np.maximum(disparity_px, np.float32(1)))
-        sigma = self.axial.sigma_m(depth_m, steep_angles(cosine), 0.0)
+        sigma = self.axial.sigma_m(depth_m, angles(cosine), 0.0)
         depth_m *= depth_m
         sigma /= depth_m
         sigma *= scale
