@@ -146,6 +146,14 @@ def test_no_camera_is_inside_or_close_to_a_box() -> None:
             assert not collide([body], row.boxes(), 0.0), row.sample_id
 
 
+def test_no_camera_stands_on_stairs_or_over_their_hole() -> None:
+    rows = [row for row in ALL if row.scene.stairs]
+    assert len(rows) > 10
+    for row in rows:
+        foot = Box(Part.OTHER, (row.x_m, row.y_m, 0.1), (0.2, 0.2, 0.2))
+        assert not collide([foot], [stairs.outline() for stairs in row.scene.stairs or ()], 0.0)
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_frames_show_enough(name: PresetName) -> None:
     for index in range(0, 40, 2):

@@ -8,9 +8,9 @@ from typing import Literal
 
 from doorstate.simulation.draw.building.plan import Plan
 from doorstate.simulation.draw.stream import Stream
-from doorstate.simulation.scene.box import Box, Pose
+from doorstate.simulation.scene.box import Pose
 from doorstate.simulation.scene.clutter import Item, ItemKind, item_boxes
-from doorstate.simulation.scene.plan import collide
+from doorstate.simulation.scene.plan import Footprints, collide
 
 _Group = Literal["desk", "table", "chairs", "plant", "bin", "carton", "cabinet"]
 _SHARES: dict[_Group, float] = {
@@ -28,11 +28,11 @@ _TRIES = 3
 _OFF_WALL_M = 0.03
 
 
-def draw_furniture(stream: Stream, plan: Plan, obstacles: list[Box]) -> tuple[Item, ...]:
+def draw_furniture(stream: Stream, plan: Plan, obstacles: Footprints) -> tuple[Item, ...]:
     """Draw groups of furniture that collide neither with one another nor with the obstacles."""
     wide = plan.layout.width_m >= _NARROW_M
     most = {"room": 5, "lobby": 3, "corridor": 2, "junction": 2, "stairwell": 1}[plan.kind]
-    taken, items = list(obstacles), list[Item]()
+    taken, items = obstacles, list[Item]()
     for _ in range(stream.integer(0, most)):
         group = stream.choice(_SHARES if wide else _NARROW_SHARES)
         for _ in range(_TRIES):
@@ -41,7 +41,7 @@ def draw_furniture(stream: Stream, plan: Plan, obstacles: list[Box]) -> tuple[It
             inside = all(plan.contains(item.x_m, item.y_m) for item in new)
             if inside and not collide(boxes, taken, 0.0):
                 items += new
-                taken += boxes
+                taken = taken.joined(Footprints.of(boxes))
                 break
     return tuple(items)
 

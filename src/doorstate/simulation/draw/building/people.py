@@ -8,9 +8,9 @@ import math
 from doorstate.simulation.draw.building.plan import Plan
 from doorstate.simulation.draw.layouts import PlacedCamera
 from doorstate.simulation.draw.stream import Stream
-from doorstate.simulation.scene.box import Box, Material
+from doorstate.simulation.scene.box import Material
 from doorstate.simulation.scene.person import Person, person_boxes
-from doorstate.simulation.scene.plan import collide
+from doorstate.simulation.scene.plan import Footprints, collide
 
 _CHANCE = 0.4
 _TRIES = 3
@@ -19,13 +19,13 @@ _CLOTHES: dict[Material, float] = {"matte": 0.6, "dark": 0.4}
 
 
 def draw_people(
-    stream: Stream, plan: Plan, camera: PlacedCamera, target_m: tuple[float, float], obstacles: list[Box]
+    stream: Stream, plan: Plan, camera: PlacedCamera, target_m: tuple[float, float], obstacles: Footprints
 ) -> tuple[Person, ...]:
     """Draw up to three people; half of them are between the camera and what it looks at."""
     if not stream.chance(_CHANCE):
         return ()
     people: list[Person] = []
-    taken = list(obstacles)
+    taken = obstacles
     for _ in range(stream.choice({1: 0.6, 2: 0.25, 3: 0.15})):
         for _ in range(_TRIES):
             person = _draw_person(stream, plan, camera, target_m)
@@ -35,7 +35,7 @@ def draw_people(
                 continue
             if not collide(boxes, taken, 0.0):
                 people.append(person)
-                taken += boxes
+                taken = taken.joined(Footprints.of(boxes))
                 break
     return tuple(people)
 

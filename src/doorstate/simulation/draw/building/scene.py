@@ -22,21 +22,22 @@ from doorstate.simulation.draw.layouts import PlacedCamera
 from doorstate.simulation.draw.scenes import DrawnScene, exhausted, solid
 from doorstate.simulation.draw.stream import Stream
 from doorstate.simulation.scene.aperture import ApertureKind
-from doorstate.simulation.scene.box import Box
 from doorstate.simulation.scene.clutter import item_boxes
 from doorstate.simulation.scene.door import Opening
 from doorstate.simulation.scene.fixture import FixtureKind, fixture_boxes
-from doorstate.simulation.scene.plan import collide
+from doorstate.simulation.scene.plan import Footprints, collide
 from doorstate.simulation.scene.scene import BoxGroups
 from doorstate.types import Part
 
 _TRIES, _CAMERA_TRIES = 200, 5
+_AROUND_CAMERA_M = -0.05  # a tolerance below zero is a distance
 RANGE_M = (0.4, 5.0)
 LEAST_MEASURED = 0.4  # of the rays, within the range
 LEAST_DOOR, USUAL_DOOR = 0.012, 0.05  # shares of the rays that a door in view needs
 _USUAL_CHANCE = 0.6  # of the second
 LEAST_SHOWN = 0.4  # of the outline of what a view without a door is about
 _MOST_BESIDE_NORMAL_DEG = 88.0
+_MOST_OFFSET_RAD = math.radians(60.0)  # of the middle of the main door from the view's axis
 
 SUBJECTS: dict[FixtureKind | ApertureKind | None, float] = {
     None: 0.16,  # a wall
@@ -79,19 +80,21 @@ def _draw_with_doors(stream: Stream, plan: Plan) -> DrawnScene | None:
     openings = draw_door_openings(stream, plan, groups)
     if openings is None:
         return None
-    swept = swept_boxes(plan, openings)
     walls = [*solid(groups.room), *(box for boxes in closed_door_boxes(groups) for box in boxes)]
+    taken = Footprints.of(
+        [*walls, *swept_boxes(plan, openings), *(flight.outline() for flight in plan.stairs)]
+    )
     target = stream.integer(0, len(plan.layout.doors) - 1)
     least = USUAL_DOOR if stream.chance(_USUAL_CHANCE) else LEAST_DOOR
     for _ in range(_CAMERA_TRIES):
         frame = plan.layout.door_frame(target)
         camera = draw_camera(stream, plan, frame)
-        if camera is None or collide([body_box(camera)], [*walls, *swept], -0.05):
+        if camera is None or collide([body_box(camera)], taken, _AROUND_CAMERA_M):
             continue
         # A first look at the bare room saves furnishing it in vain.
         if _main_door(plan, look(groups.all(), camera, COARSE), groups, camera, least) is None:
             continue
-        furnished = _furnish(stream, plan, camera, (frame.x_m, frame.y_m), [*walls, *swept])
+        furnished = _furnish(stream, plan, camera, (frame.x_m, frame.y_m), taken)
         groups_then = furnished.box_groups(0)
         main = _main_door(furnished, look(groups_then.all(), camera), groups_then, camera, least)
         if main is not None:
@@ -100,14 +103,14 @@ def _draw_with_doors(stream: Stream, plan: Plan) -> DrawnScene | None:
 
 
 def _furnish(
-    stream: Stream, plan: Plan, camera: PlacedCamera, target_m: tuple[float, float], obstacles: list[Box]
+    stream: Stream, plan: Plan, camera: PlacedCamera, target_m: tuple[float, float], obstacles: Footprints
 ) -> Plan:
     """Return the plan with fixtures, furniture and people that keep clear of obstacles and the camera."""
-    taken = [*obstacles, body_box(camera), *(flight.outline() for flight in plan.stairs)]
+    taken = obstacles.joined(Footprints.of([body_box(camera)]))
     fixtures = (*plan.fixtures, *draw_wall_fixtures(stream, plan, taken))
-    taken += [box for fixture in fixtures for box in fixture_boxes(fixture)]
+    taken = taken.joined(Footprints.of([box for fixture in fixtures for box in fixture_boxes(fixture)]))
     plan = plan._replace(fixtures=fixtures, items=draw_furniture(stream, plan, taken))
-    taken += [box for item in plan.items for box in item_boxes(item)]
+    taken = taken.joined(Footprints.of([box for item in plan.items for box in item_boxes(item)]))
     return plan._replace(people=draw_people(stream, plan, camera, target_m, taken))
 
 
@@ -128,6 +131,8 @@ def _main_door(
         beside_deg = math.degrees(math.atan2(abs(seen.x_m), seen.y_m))
         if view.share_on(numbers, RANGE_M[1]) >= least_share and beside_deg <= _MOST_BESIDE_NORMAL_DEG:
             ahead = camera.pose.inverse().after(plan.layout.door_frame(number))
+            if abs(math.atan2(ahead.y_m, ahead.x_m)) > _MOST_OFFSET_RAD:
+                continue
             remoteness[number] = remoteness_m(ahead.x_m, ahead.y_m)
     return min(remoteness, key=remoteness.__getitem__) if remoteness else None
 
@@ -151,7 +156,7 @@ def _drawn(
 
 
 class _Subject(NamedTuple):
-    """What a view without a door is about: a plan that contains it, where it is, and its outline on the wall."""
+    """Subject of a view without a door: a plan that contains it, its place, and its outline on the wall."""
 
     plan: Plan
     place: Place
@@ -168,10 +173,11 @@ def _draw_without_door(
         return None
     plan, place, width_m, heights_m = subject
     groups, frame = plan.box_groups(place), plan.on_wall(*place)
-    obstacles = [*solid(groups.room), *groups.main]
+    outlines = [flight.outline() for flight in plan.stairs]
+    obstacles = Footprints.of([*solid(groups.room), *groups.main, *outlines])
     for _ in range(_CAMERA_TRIES):
         camera = draw_camera(stream, plan, frame)
-        if camera is None or collide([body_box(camera)], obstacles, -0.05):
+        if camera is None or collide([body_box(camera)], obstacles, _AROUND_CAMERA_M):
             continue
         if shows_rectangle(camera, frame, width_m, heights_m) < LEAST_SHOWN:
             continue
@@ -203,7 +209,9 @@ def _draw_subject(
     along = stream.uniform(low, high)
     most = 2 * min(along - low, high - along) - 0.04
     fixture = draw_fixture(stream, plan, shows, wall, along, most)
-    if fixture is None or not clear_of([fixture], [flight.outline() for flight in plan.stairs]):
+    if fixture is None or not clear_of(
+        [fixture], Footprints.of([flight.outline() for flight in plan.stairs])
+    ):
         return None
     plan, heights_m = plan._replace(fixtures=(fixture,)), (fixture.bottom_m, min(fixture.top_m, 2.2))
     return _Subject(plan, Place(wall, along), fixture.width_m, heights_m)

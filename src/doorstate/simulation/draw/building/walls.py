@@ -11,14 +11,15 @@ import numpy as np
 from doorstate.simulation.draw.building.plan import Plan, turned
 from doorstate.simulation.draw.layouts import WallDoor
 from doorstate.simulation.draw.stream import Stream
-from doorstate.simulation.scene.box import Box, Material, Pose
+from doorstate.simulation.scene.box import Material, Pose
 from doorstate.simulation.scene.fixture import Fixture, FixtureKind, fixture_boxes
-from doorstate.simulation.scene.plan import colliding
+from doorstate.simulation.scene.plan import Footprints, colliding
 
 _Range = tuple[float, float]
 _MATERIALS: dict[Material, float] = {"matte": 0.7, "gloss": 0.15, "dark": 0.15}
 _LEAST_WAY_M = 0.9  # left beside a fixture on the floor
 _CORNER_M = 0.02
+_ORIGIN = Pose(0.0, 0.0, 0.0)
 
 
 class _Sizes(NamedTuple):
@@ -60,20 +61,20 @@ _SHARES: dict[FixtureKind, float] = {
 _FULL_HEIGHT: tuple[FixtureKind, ...] = ("column", "round_column")
 
 
-def draw_wall_fixtures(stream: Stream, plan: Plan, obstacles: list[Box]) -> tuple[Fixture, ...]:
+def draw_wall_fixtures(stream: Stream, plan: Plan, obstacles: Footprints) -> tuple[Fixture, ...]:
     """Draw fixtures along all walls that collide with nothing.
 
     Args:
         stream: random numbers.
         plan: the room.
-        obstacles: boxes to stay clear of, without the walls themselves.
+        obstacles: boxes to stay clear of.
     """
     has_skirting, skirting = stream.chance(0.55), (stream.uniform(0.05, 0.14), stream.uniform(0.008, 0.02))
     has_duct, duct_z = stream.chance(0.15), stream.choice({0.12: 1, stream.uniform(0.9, 1.1): 1, 2.2: 1})
     has_rail = stream.chance(0.15) and plan.kind in ("corridor", "stairwell")
     crowded = stream.uniform(0.2, 1.0)
     fixtures: list[Fixture] = []
-    taken = list(obstacles)
+    taken = obstacles
     for wall in range(4):
         new: list[Fixture] = []
         for low, high in plan.free_stretches(wall):
@@ -81,12 +82,12 @@ def draw_wall_fixtures(stream: Stream, plan: Plan, obstacles: list[Box]) -> tupl
             if high - low < 0.08:
                 continue
             if has_skirting:
-                new.append(at("skirting", 0.5, high - low - 2 * _CORNER_M, skirting[1], (0.0, skirting[0])))
+                new.append(at("skirting", high - low - 2 * _CORNER_M, skirting[1], (0.0, skirting[0])))
             if has_duct and high - low > 0.5:
-                new.append(at("duct", 0.5, high - low - 0.1, 0.05, (duct_z, duct_z + 0.08)))
+                new.append(at("duct", high - low - 0.1, 0.05, (duct_z, duct_z + 0.08)))
             has_handrail = has_rail and high - low > 0.8
             if has_handrail:
-                new.append(at("handrail", 0.5, high - low - 0.1, 0.07, (0.0, 0.9)))
+                new.append(at("handrail", high - low - 0.1, 0.07, (0.0, 0.9)))
             row = _draw_row(stream, plan, wall, (low, high), crowded)
             new += [one for one in row if one.bottom_m > 0.95] if has_handrail else row
         new += [
@@ -97,7 +98,8 @@ def draw_wall_fixtures(stream: Stream, plan: Plan, obstacles: list[Box]) -> tupl
         ]
         kept = clear_of(new, taken)
         fixtures += kept
-        taken += [box for fixture in kept if fixture.depth_m > 0.05 for box in fixture_boxes(fixture)]
+        deep = [box for fixture in kept if fixture.depth_m > 0.05 for box in fixture_boxes(fixture)]
+        taken = taken.joined(Footprints.of(deep))
     return tuple(fixtures)
 
 
@@ -131,7 +133,7 @@ def draw_fixture(
     )
 
 
-def clear_of(fixtures: list[Fixture], obstacles: list[Box]) -> list[Fixture]:
+def clear_of(fixtures: list[Fixture], obstacles: Footprints) -> list[Fixture]:
     """Return the fixtures that touch no obstacle."""
     owners, boxes = [], []
     for number, fixture in enumerate(fixtures):
@@ -140,9 +142,6 @@ def clear_of(fixtures: list[Fixture], obstacles: list[Box]) -> list[Fixture]:
         boxes += own
     hit = {owners[number] for number in np.flatnonzero(colliding(boxes, obstacles, 0.001)).tolist()}
     return [fixture for number, fixture in enumerate(fixtures) if number not in hit]
-
-
-_ORIGIN = Pose(0.0, 0.0, 0.0)
 
 
 def _draw_row(
@@ -185,8 +184,10 @@ def _draw_switch(stream: Stream, plan: Plan, door: WallDoor) -> Fixture:
 
 
 def _on_stretch(plan: Plan, wall: int, low: float, high: float) -> Callable[..., Fixture]:
-    def at(kind: FixtureKind, share: float, width: float, depth: float, ends: tuple[float, float]) -> Fixture:
-        x_m, y_m, yaw_deg = turned(plan.on_wall(wall, low + share * (high - low)), _ORIGIN)
+    """Return a function that places a long fixture in the middle of a stretch of wall."""
+
+    def at(kind: FixtureKind, width: float, depth: float, ends: tuple[float, float]) -> Fixture:
+        x_m, y_m, yaw_deg = turned(plan.on_wall(wall, (low + high) / 2), _ORIGIN)
         return Fixture(
             kind=kind,
             x_m=x_m,
