@@ -9,14 +9,13 @@ the rename.
 from __future__ import annotations
 
 import csv
-import glob
 import gzip
 import io
 import os
 import re
 import secrets
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -95,10 +94,15 @@ def is_scratch(path: Path) -> bool:
     return _SCRATCH.fullmatch(path.name) is not None
 
 
-def remove_scratch(target: Path) -> None:
-    """Remove temporary files of killed processes that were writing `target`."""
-    for path in target.parent.glob(f".*.tmp.{glob.escape(target.name)}"):
-        path.unlink(missing_ok=True)
+def remove_scratch(targets: Iterable[Path]) -> None:
+    """Remove temporary files of killed processes that were writing one of the targets."""
+    names: dict[Path, set[str]] = {}
+    for target in targets:
+        names.setdefault(target.parent, set()).add(target.name)
+    for folder in filter(Path.is_dir, names):
+        for path in folder.glob(".*.tmp.*"):
+            if path.name.partition(".tmp.")[2] in names[folder]:
+                path.unlink(missing_ok=True)
 
 
 def is_vacant(folder: Path) -> bool:

@@ -177,6 +177,7 @@ EXTRAS = {
     "onnx": ("onnx", "onnxscript"),
     "serve": ("fastapi", "uvicorn", "prometheus_client", "jinja2"),
     "bags": ("rosbags",),
+    "cluster": ("ray",),
 }
 """Modules of the optional dependencies, by the name of the extra that installs them (pyproject.toml)."""
 

@@ -154,6 +154,7 @@ SENSOR = Choice("sensor", "sensor", _sensors, prefix="gaussian:")
 RAW_KIND = Choice("kind of raw file", "keep", _raw_kinds)
 INPUT = Choice("input", "input", _inputs)
 KEPT_CROPS = Choice("choice of crops", "crops", lambda: ("all", "best"))
+ENGINE = Choice("engine", "engine", lambda: ("processes", "ray"))
 
 _PLACEHOLDERS = {
     "packaged": PACKAGED,
@@ -168,6 +169,7 @@ _PLACEHOLDERS = {
     "raw_kinds": RAW_KIND,
     "inputs": INPUT,
     "kept_crops": KEPT_CROPS,
+    "engines": ENGINE,
 }
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from doorstate.cli.choices import split_names
+from doorstate.cli.engine_options import EngineOptions, with_runs_options
 from doorstate.cli.options import (
     AsJson,
     Changes,
@@ -16,7 +17,6 @@ from doorstate.cli.options import (
     Device,
     Epochs,
     HeadNames,
-    Jobs,
     Protocol,
     RecipeName,
     RuleNames,
@@ -27,9 +27,11 @@ from doorstate.cli.options import (
 from doorstate.errors import ConfigError
 
 if TYPE_CHECKING:
+    from doorstate._jobs import Engine, Resources
     from doorstate.training.experiment import Experiment
 
 
+@with_runs_options
 def compare(
     experiment: Annotated[
         Path | None, typer.Argument(help="Experiment file (TOML); options override its values.")
@@ -48,7 +50,8 @@ def compare(
     changes: Changes = None,
     device: Device = "auto",
     as_json: AsJson = False,
-    jobs: Jobs = 1,
+    *,
+    runs: EngineOptions,
 ) -> None:
     """Compare networks and rules by cross-validation.
 
@@ -84,7 +87,8 @@ def compare(
         overrides.setdefault("num_points", open_dataset(data).num_points)
     settings = load_experiment(experiment, overrides | {"recipe_changes": changed})
     folder = out or Path("runs") / settings.name
-    metrics = compare_with_display(settings, folder, jobs, device)
+    with runs.open() as engine:
+        metrics = compare_with_display(settings, folder, engine, runs.resources, device)
     if as_json:
         for run in metrics:
             print_json(run)
@@ -101,7 +105,7 @@ def compare(
 
 
 def compare_with_display(
-    experiment: Experiment, folder: Path, jobs: int, device: str = "auto"
+    experiment: Experiment, folder: Path, engine: Engine, resources: Resources | None, device: str = "auto"
 ) -> list[dict[str, Any]]:
     """Run a comparison with a live display of its progress, and return the metrics of each run."""
     from doorstate._locks import owned_folder
@@ -111,8 +115,9 @@ def compare_with_display(
 
     recipes = {network: experiment.recipe_of(network) for network in experiment.networks}
     runs = plan_runs(experiment, folder)
-    with owned_folder(folder), live_runs(runs, recipes, experiment.num_points, jobs) as progress:
-        return run_comparison(experiment, folder, jobs, progress, device)
+    at_once = engine.at_once(resources)
+    with owned_folder(folder), live_runs(runs, recipes, experiment.num_points, at_once) as progress:
+        return run_comparison(experiment, folder, engine, progress, resources, device)
 
 
 def _score_row(method: str, metrics: list[dict[str, Any]]) -> list[str]:

@@ -14,6 +14,7 @@ _FLAGS = {
     "raw": "--keep",
     "recipe_changes": "--set",
     "dataset": "--data",
+    "memory_bytes": "--memory-gib",
 }
 
 

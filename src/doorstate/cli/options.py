@@ -113,7 +113,6 @@ ShardOption = Annotated[
     str | None,
     typer.Option(help="Process only this part of the work, such as 2/8; without it, all parts are joined."),
 ]
-Workers = Annotated[int | None, typer.Option(help="Worker processes. [default: one a processor]", min=1)]
 
 # Training.
 TrainedNetwork = Annotated[
@@ -147,7 +146,6 @@ Seed = Annotated[
     int | None, typer.Option("--seed", help="Seed of the split and of training. [default: 0]", min=0)
 ]
 Epochs = Annotated[int | None, typer.Option("--epochs", help="Epochs. [default: as in the recipe]", min=1)]
-Jobs = Annotated[int, typer.Option(help="Number of runs at the same time.", min=1)]
 Changes = Annotated[
     list[str] | None,
     typer.Option(

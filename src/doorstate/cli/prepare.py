@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from doorstate.cli.options import LayoutName, ShardOption, Workers
+from doorstate.cli.engine_options import EngineOptions, with_engine_options
+from doorstate.cli.options import LayoutName, ShardOption
 from doorstate.cli.prepared_options import (
     AddMissed,
     InputName,
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 _MAX_LISTED = 10  # rejected clouds
 
 
+@with_engine_options
 @with_reading_options
 def prepare(
     source: Annotated[
@@ -43,7 +45,6 @@ def prepare(
             help="CSV file with the poses of clouds in state folders: file,x_m,y_m or file,distance_m,robot_angle_deg.",
         ),
     ] = None,
-    workers: Workers = None,
     shard: ShardOption = None,
     layout: LayoutName = None,
     max_depth: MaxDepth = None,
@@ -54,6 +55,7 @@ def prepare(
     add_missed: AddMissed = False,
     *,
     options: ReadOptions,
+    engine: EngineOptions,
 ) -> None:
     """Clean and sort clouds for training.
 
@@ -83,11 +85,11 @@ def prepare(
     preparation = Preparation(source, spec, poses, options, layout, kept)
     if shard is not None:
         part = Shard.parse(shard)
-        with progress_bar("Preparing") as progress:
+        with engine.open() as workers, progress_bar("Preparing") as progress:
             prepare_shard(preparation, out, part, workers, progress)
         stdout.print(f"shard {shard} is in {out}; run the command without --shard to join all shards")
         return
-    with progress_bar("Preparing") as progress:
+    with engine.open() as workers, progress_bar("Preparing") as progress:
         summary = prepare_dataset(preparation, out, workers, progress)
     print_summary(summary, out)
 

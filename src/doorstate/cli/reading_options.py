@@ -3,15 +3,13 @@
 
 from __future__ import annotations
 
-import inspect
-from collections.abc import Callable
 from dataclasses import replace
-from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from doorstate.cli.shared_options import with_shared_options
 from doorstate.errors import CameraError, ConfigError
 
 if TYPE_CHECKING:
@@ -107,33 +105,7 @@ def read_options(
         raise ConfigError(error.message, field=error.field, expected=error.expected) from error
 
 
-def with_reading_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Add the options of `read_options` to a command, which gets their result as its parameter `options`.
-
-    typer makes the options of a command from its signature.
-    """
-    # The class is imported only when a command runs, so that `--help` is quick.
-    hints = get_type_hints(command, localns={"ReadOptions": Any}, include_extras=True)
-    own = inspect.signature(command).parameters.values()
-    shared = inspect.signature(read_options).parameters.values()
-    shared_hints = get_type_hints(read_options, localns={"ReadOptions": Any}, include_extras=True)
-    parameters = [
-        *(
-            parameter.replace(annotation=hints[parameter.name])
-            for parameter in own
-            if parameter.name != "options"
-        ),
-        *(parameter.replace(annotation=shared_hints[parameter.name]) for parameter in shared),
-    ]
-
-    @wraps(command)
-    def run(**values: Any) -> None:
-        shared_values = {parameter.name: values.pop(parameter.name) for parameter in shared}
-        command(**values, options=read_options(**shared_values))
-
-    run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-    run.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
-    return run
+with_reading_options = with_shared_options(read_options, "options", "ReadOptions")
 
 
 def check_layout(layout: str | None, options: ReadOptions) -> None:

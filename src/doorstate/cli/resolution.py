@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from doorstate.cli.options import Jobs
+from doorstate.cli.engine_options import EngineOptions, with_runs_options
 
 if TYPE_CHECKING:
     from doorstate.training.resolution import ResolutionStudy
@@ -16,10 +16,12 @@ if TYPE_CHECKING:
 _TIMED_CLOUDS, _REPEATS = 9, 3
 
 
+@with_runs_options
 def resolution(
     study: Annotated[Path, typer.Argument(help="Study file (TOML).")],
     out: Annotated[Path | None, typer.Option(help="Folder of the study. [default: runs/NAME]")] = None,
-    jobs: Jobs = 1,
+    *,
+    runs: EngineOptions,
 ) -> None:
     """Test trained networks with fewer points.
 
@@ -43,9 +45,9 @@ def resolution(
     settings = load_study(study, ResolutionStudy)
     folder = out or Path("runs") / settings.name
     parts = list(settings.parts())
-    with owned_folder(folder):
+    with owned_folder(folder), runs.open() as engine:
         for part in parts:
-            compare_with_display(part.experiment, folder / part.folder, jobs)
+            compare_with_display(part.experiment, folder / part.folder, engine, runs.resources)
         if not (folder / LATENCY).is_file():
             _measure_latency(settings, folder)
     results = load_study_results(folder)

@@ -9,7 +9,8 @@ from typing import Annotated
 import typer
 
 from doorstate.cli.choices import PRESET, RAW_KIND, SENSOR, split_names
-from doorstate.cli.options import ShardOption, Workers
+from doorstate.cli.engine_options import EngineOptions, with_engine_options
+from doorstate.cli.options import ShardOption
 from doorstate.cli.prepared_options import (
     AddMissed,
     InputName,
@@ -23,6 +24,7 @@ from doorstate.cli.prepared_options import (
 from doorstate.errors import ConfigError
 
 
+@with_engine_options
 def simulate(
     out: Annotated[Path, typer.Option(help="Folder to create, or to continue.")],
     preset: Annotated[
@@ -52,7 +54,6 @@ def simulate(
         list[str] | None,
         typer.Option(parser=RAW_KIND, metavar="NAME", help="Raw files to write: {raw_kinds}; repeatable."),
     ] = None,
-    workers: Workers = None,
     shard: ShardOption = None,
     prepared: Annotated[
         Path | None,
@@ -65,6 +66,8 @@ def simulate(
     input_name: InputName = "whole",
     crops: KeptCrops = "all",
     add_missed: AddMissed = False,
+    *,
+    engine: EngineOptions,
 ) -> None:
     """Simulate doors seen by a depth camera.
 
@@ -99,11 +102,11 @@ def simulate(
         raise ConfigError("options of prepared clouds need --prepared")
     if shard is not None:
         part = Shard.parse(shard)
-        with progress_bar("Simulating") as progress:
+        with engine.open() as workers, progress_bar("Simulating") as progress:
             simulate_shard(out, settings, part, workers, progress, Sampler(preparation) if prepared else None)
         stdout.print(f"shard {shard} is in {out}; run the command without --shard to join all shards")
         return
-    with progress_bar("Simulating") as progress:
+    with engine.open() as workers, progress_bar("Simulating") as progress:
         summary = (
             None
             if prepared is None

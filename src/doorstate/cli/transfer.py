@@ -8,13 +8,15 @@ from typing import Annotated
 
 import typer
 
-from doorstate.cli.options import Jobs
+from doorstate.cli.engine_options import EngineOptions, with_runs_options
 
 
+@with_runs_options
 def transfer(
     study: Annotated[Path, typer.Argument(help="Study file (TOML).")],
     out: Annotated[Path | None, typer.Option(help="Folder of the study. [default: runs/NAME]")] = None,
-    jobs: Jobs = 1,
+    *,
+    runs: EngineOptions,
 ) -> None:
     """Test trained networks on other data sets.
 
@@ -38,10 +40,10 @@ def transfer(
     settings = load_study(study, TransferStudy)
     folder = out or Path("runs") / settings.name
     parts = list(settings.parts())
-    with owned_folder(folder):
+    with owned_folder(folder), runs.open() as engine:
         settings.prepare(folder)
         for part in parts:
-            compare_with_display(part.experiment, folder / part.folder, jobs)
+            compare_with_display(part.experiment, folder / part.folder, engine, runs.resources)
     results = load_study_results(folder)
     scores = score_transfer(results, tuple(settings.trained), tuple(settings.tested))
     table = transfer_table(scores)

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from doorstate import __version__
 from doorstate._files import is_vacant, read_csv, write_csv
-from doorstate._jobs import Progress, Shard, default_workers, no_progress, piece_paths, run_pieces
+from doorstate._jobs import Progress, Shard, WorkersOrEngine, no_progress, piece_paths, run_pieces
 from doorstate._locks import owned_folder
 from doorstate._paths import check_encoding, csv_name
 from doorstate.dataset.description import DESCRIPTION_FILE, DatasetDescription
@@ -44,7 +44,7 @@ class _Piece(NamedTuple):
 
 
 def prepare_dataset(
-    preparation: Preparation, folder: Path, workers: int | None = None, progress: Progress = no_progress
+    preparation: Preparation, folder: Path, workers: WorkersOrEngine = None, progress: Progress = no_progress
 ) -> PreparationSummary:
     """Prepare clouds of one size into `folder`, continuing where a killed run or shards of it stopped.
 
@@ -54,7 +54,7 @@ def prepare_dataset(
     Args:
         preparation: source and settings.
         folder: output folder.
-        workers: processes; None is one per processor.
+        workers: processes, None is one per processor; or an engine.
         progress: called with pieces done and pieces in all.
 
     Raises:
@@ -69,7 +69,7 @@ def prepare_dataset(
             progress(1, 1)
             rejected = read_csv(folder / REJECTED) if (folder / REJECTED).exists() else []
             return PreparationSummary(open_dataset(folder), rejected)
-        run_pieces(_prepare_piece, pieces, paths, workers or default_workers(), progress)
+        run_pieces(_prepare_piece, pieces, paths, workers, progress)
         return assemble([row for piece in pieces for row in piece.rows], preparation, folder, paths)
 
 
@@ -77,7 +77,7 @@ def prepare_shard(
     preparation: Preparation,
     folder: Path,
     shard: Shard,
-    workers: int | None = None,
+    workers: WorkersOrEngine = None,
     progress: Progress = no_progress,
 ) -> None:
     """Prepare the pieces of one shard; `prepare_dataset` joins them when all shards are done.
@@ -92,9 +92,7 @@ def prepare_shard(
         if (folder / DESCRIPTION_FILE).exists():
             progress(1, 1)
             return
-        run_pieces(
-            _prepare_piece, shard.select(pieces), shard.select(paths), workers or default_workers(), progress
-        )
+        run_pieces(_prepare_piece, shard.select(pieces), shard.select(paths), workers, progress)
 
 
 def assemble(

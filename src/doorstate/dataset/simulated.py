@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from doorstate._jobs import Progress, no_progress
+from doorstate._jobs import Progress, WorkersOrEngine, no_progress
 from doorstate._locks import owned_folder
 from doorstate.dataset.pieces import PieceClouds
 from doorstate.dataset.preparation import Preparation
@@ -53,7 +53,7 @@ def simulate_prepared(
     settings: SimulationSettings,
     preparation: Preparation,
     folder: Path,
-    workers: int | None = None,
+    workers: WorkersOrEngine = None,
     progress: Progress = no_progress,
 ) -> PreparationSummary:
     """Simulate into `preparation.source` and prepare into `folder`, continuing where a killed run or shards stopped.
@@ -64,7 +64,7 @@ def simulate_prepared(
         settings: settings of the simulation.
         preparation: preparation of the clouds.
         folder: output folder of the prepared data set.
-        workers: processes; None is one per processor.
+        workers: processes, None is one per processor; or an engine.
         progress: called with pieces of the simulation done and pieces in all.
 
     Raises:

@@ -20,7 +20,7 @@ from pydantic import ValidationError
 from doorstate._documents import read_json
 from doorstate._files import atomic_path, is_vacant, read_csv, write_csv, write_text
 from doorstate._input import MAX_SETTINGS_BYTES
-from doorstate._jobs import Progress, Shard, default_workers, no_progress, piece_paths, run_pieces
+from doorstate._jobs import Progress, Shard, WorkersOrEngine, no_progress, piece_paths, run_pieces
 from doorstate._locks import owned_folder
 from doorstate._memory import keep_freed_memory
 from doorstate.errors import ConfigError, DatasetError, first_validation_error
@@ -51,7 +51,7 @@ class _Piece(NamedTuple):
 def simulate_dataset(
     folder: Path,
     settings: SimulationSettings,
-    workers: int | None = None,
+    workers: WorkersOrEngine = None,
     progress: Progress = no_progress,
     callback: PieceCallback | None = None,
 ) -> list[dict[str, str]]:
@@ -60,7 +60,7 @@ def simulate_dataset(
     Args:
         folder: output folder.
         settings: preset, seed and extent of the data set.
-        workers: processes; None is one per processor.
+        workers: processes, None is one per processor; or an engine.
         progress: called with pieces done and pieces in all.
         callback: called for every piece before it counts as done.
 
@@ -78,7 +78,7 @@ def simulate_dataset(
             shutil.rmtree(scratch, ignore_errors=True)
             progress(1, 1)
             return read_csv(manifest)
-        run_pieces(_simulate_piece, pieces, paths, workers or default_workers(), progress)
+        run_pieces(_simulate_piece, pieces, paths, workers, progress)
         rows = [row for path in paths for row in read_csv(path)]
         if "depth" in settings.raw:
             write_csv(folder / "depth" / INDEX_FILE, [_index_row(unflatten(row)) for row in rows])
@@ -91,7 +91,7 @@ def simulate_shard(
     folder: Path,
     settings: SimulationSettings,
     shard: Shard,
-    workers: int | None = None,
+    workers: WorkersOrEngine = None,
     progress: Progress = no_progress,
     callback: PieceCallback | None = None,
 ) -> None:
@@ -109,9 +109,7 @@ def simulate_shard(
         if (folder / MANIFEST_FILE).exists():
             progress(1, 1)
             return
-        run_pieces(
-            _simulate_piece, shard.select(pieces), shard.select(paths), workers or default_workers(), progress
-        )
+        run_pieces(_simulate_piece, shard.select(pieces), shard.select(paths), workers, progress)
 
 
 def read_settings(folder: Path) -> SimulationSettings:

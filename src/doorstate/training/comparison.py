@@ -13,7 +13,7 @@ import torch
 from pydantic import ValidationError
 
 from doorstate._documents import read_json
-from doorstate._jobs import Progress, default_workers, no_progress, run_pieces
+from doorstate._jobs import Progress, Resources, WorkersOrEngine, engine_of, no_progress, run_pieces
 from doorstate._locks import owned_folder
 from doorstate.dataset.loader import check_states
 from doorstate.dataset.roles import Role
@@ -62,8 +62,9 @@ def plan_runs(experiment: Experiment, folder: Path) -> list[RunSpec]:
 def compare(
     experiment: Experiment,
     folder: Path,
-    jobs: int = 1,
+    jobs: WorkersOrEngine = 1,
     progress: Progress = no_progress,
+    resources: Resources | None = None,
     device: str = "auto",
 ) -> list[dict[str, Any]]:
     """Train and test every network, and test every rule, on every fold.
@@ -73,8 +74,9 @@ def compare(
     Args:
         experiment: experiment to run.
         folder: folder of the comparison: `comparison.json`, `splits.csv`, `runs/<method>/fold<k>/`.
-        jobs: number of runs at the same time, which share the processors equally.
+        jobs: number of runs at the same time, or an engine.
         progress: called with the numbers of finished runs and of all runs.
+        resources: needs of each run, whose threads are its processors; None: runs share the processors equally.
         device: name of the device that networks are trained on, as for `--device`.
 
     Returns:
@@ -87,9 +89,10 @@ def compare(
     with owned_folder(folder):
         prepare_comparison(experiment, folder)
         runs = plan_runs(experiment, folder)
-        threads = max(1, default_workers() // jobs) if jobs > 1 else None
+        engine = engine_of(jobs)
+        threads = engine.threads(resources)
         pieces = [_Piece(experiment, folder, run.method, run.fold, threads, device) for run in runs]
-        run_pieces(_run_piece, pieces, [run.folder.metrics for run in runs], jobs, progress)
+        run_pieces(_run_piece, pieces, [run.folder.metrics for run in runs], engine, progress, resources)
         return [run.folder.read_metrics() for run in runs]
 
 
