@@ -119,5 +119,5 @@ def runs_options(
     return engine_options(jobs, engine, address)._replace(resources=resources)
 
 
-with_engine_options = with_shared_options(engine_options, "engine", "Resources")
-with_runs_options = with_shared_options(runs_options, "runs", "Resources")
+with_engine_options = with_shared_options(engine_options, "engine")
+with_runs_options = with_shared_options(runs_options, "runs")

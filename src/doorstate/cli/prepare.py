@@ -30,8 +30,8 @@ if TYPE_CHECKING:
 _MAX_LISTED = 10  # rejected clouds
 
 
-@with_engine_options
 @with_reading_options
+@with_engine_options
 def prepare(
     source: Annotated[
         Path, typer.Argument(help="Simulated folder, or folder with one sub-folder of clouds for each state.")

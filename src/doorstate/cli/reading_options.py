@@ -105,7 +105,7 @@ def read_options(
         raise ConfigError(error.message, field=error.field, expected=error.expected) from error
 
 
-with_reading_options = with_shared_options(read_options, "options", "ReadOptions")
+with_reading_options = with_shared_options(read_options, "options")
 
 
 def check_layout(layout: str | None, options: ReadOptions) -> None:

@@ -9,11 +9,11 @@ from functools import wraps
 from typing import Any, get_type_hints
 
 Command = Callable[..., None]
+# Classes in annotations that are imported only when a command runs, so that `--help` is quick.
+_UNIMPORTED = dict.fromkeys(("ReadOptions", "Resources"), Any)
 
 
-def with_shared_options(
-    read: Callable[..., Any], name: str, unimported: str = ""
-) -> Callable[[Command], Command]:
+def with_shared_options(read: Callable[..., Any], name: str) -> Callable[[Command], Command]:
     """Return a decorator that adds options to a command, which gets what they give as one parameter.
 
     typer makes the options of a command from its signature.
@@ -21,15 +21,12 @@ def with_shared_options(
     Args:
         read: function whose parameters are the options, and which returns the object.
         name: parameter of the command that gets it.
-        unimported: name of a class in the annotations that is imported only when a command runs, so that `--help` is
-            quick.
     """
-    names = {unimported: Any}
     shared = inspect.signature(read).parameters.values()
-    shared_hints = get_type_hints(read, localns=names, include_extras=True)
+    shared_hints = get_type_hints(read, localns=_UNIMPORTED, include_extras=True)
 
     def decorate(command: Command) -> Command:
-        hints = get_type_hints(command, localns=names, include_extras=True)
+        hints = get_type_hints(command, localns=_UNIMPORTED, include_extras=True)
         own = [
             parameter
             for parameter in inspect.signature(command).parameters.values()
