@@ -21,7 +21,6 @@ from benchmarks.measured_network import MeasuredNetwork, NetworkTask, OperationC
 from benchmarks.store import Result
 from benchmarks.timing import MatrixSpeed, median_seconds
 from doorstate._devices import has_fast_bf16
-from doorstate._jobs import default_workers
 from doorstate.clouds.device_sampling import farthest_points
 from doorstate.errors import summarize_exception
 from doorstate.networks import create_network
@@ -108,7 +107,7 @@ def compare(name: str, points: Tensor, labels: Tensor, device: torch.device) -> 
 
 def measure_peaks(device: torch.device, quick: bool) -> list[Result]:
     """Return the speeds of a matrix product and of a copy."""
-    speed = MatrixSpeed(default_workers(), str(device))
+    speed = MatrixSpeed(torch.get_num_threads(), str(device))
     values = torch.zeros(2**20 if quick else _COPIED_VALUES, device=device)
     seconds = median_seconds(lambda: values.clone(), device=str(device))
     return [
@@ -130,7 +129,9 @@ def measure_forms(
     gflop = OperationCount(network, clouds).training_gflop()
     rows = []
     for form in forms:
-        task = NetworkTask(network, form, clouds, batch, default_workers(), checkout, device=str(device))
+        task = NetworkTask(
+            network, form, clouds, batch, torch.get_num_threads(), checkout, device=str(device)
+        )
         measured = MeasuredNetwork(task)
         training_ms = measured.training_seconds() * 1000 / batch
         rows.append(
@@ -188,8 +189,8 @@ def measure_rendering(device: torch.device, quick: bool) -> list[Result]:
     """Return the times of frames that are rendered together (`python -m benchmarks simulation`)."""
     from benchmarks.simulation import measure_batches
 
-    scenes, numbers = (2, [1]) if quick else (64, [1, 8, 64])
-    return measure_batches("varied", "xtion", scenes, numbers, str(device), default_workers())
+    scenes, numbers = (1, [1]) if quick else (64, [1, 8, 64])
+    return measure_batches("varied", "xtion", scenes, numbers, str(device), torch.get_num_threads())
 
 
 def _training_step(network: PointNetwork, points: Tensor, labels: Tensor) -> tuple[dict[str, Tensor], Tensor]:
