@@ -28,10 +28,17 @@ from doorstate.simulation.truth import TrueDoor, true_doors
 SEED = 1_000_003  # of no data set
 Source = tuple[PresetName, str]
 """Preset and sensor of simulated frames."""
-SOURCES: tuple[Source, ...] = tuple(
-    (preset, sensor)
-    for preset in ("varied", "cluttered", "corridor", "two-doors", "no-door")
-    for sensor in ("xtion", "d435")
+SOURCES: tuple[Source, ...] = (
+    *(
+        (preset, sensor)
+        for preset in ("varied", "cluttered", "corridor", "two-doors", "no-door")
+        for sensor in ("xtion", "d435")
+    ),
+    *(
+        (preset, sensor)
+        for preset in ("building", "building-no-door")
+        for sensor in ("xtion-matching", "d435-matching", "azure-kinect")
+    ),
 )
 VISIBLE_PX = 1500  # of a door that should be found
 _EXACT_M, _EXACT_DEG = 0.08, 4.0
