@@ -227,6 +227,24 @@ def busy(
 
 
 @app.command()
+def engines(
+    out: Out,
+    scenes: Annotated[int, typer.Option(help="Scenes to simulate and prepare.", min=8)] = 96,
+    pieces: Annotated[int, typer.Option(help="Pieces that do nothing.", min=1)] = 100_000,
+    seconds: Annotated[int, typer.Option(help="Pieces of a second for each worker.", min=1)] = 10,
+    repeats: Repeats = 3,
+) -> None:
+    """Start, overhead, gain of a second worker and very many pieces of both engines: processes and Ray."""
+    from benchmarks.engines import EngineBenchmark, engines_table, measure_engines
+    from doorstate.cli.progress import progress_bar
+
+    plan = EngineBenchmark(scenes, pieces, seconds, repeats)
+    with progress_bar("engines") as progress:
+        rows = measure_engines(plan, progress)
+    store_results(out, "engines", rows, engines_table(rows), **plan._asdict())
+
+
+@app.command()
 def gpu(
     out: Out,
     device: Device = "cuda",

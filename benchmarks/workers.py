@@ -19,14 +19,20 @@ class _Failure(NamedTuple):
 
 
 class Worker:
-    """Process that builds one object and calls its methods one at a time, until it is closed."""
+    """Process that builds one object and calls its methods one at a time, until it is closed.
 
-    def __init__(self, factory: Callable[..., object], *arguments: Any) -> None:
+    Args:
+        factory: makes the object.
+        arguments: its arguments.
+        is_parent: the process starts others.
+    """
+
+    def __init__(self, factory: Callable[..., object], *arguments: Any, is_parent: bool = False) -> None:
         # spawn: the process inherits no memory, threads or allocator state.
         context = multiprocessing.get_context("spawn")
         self._connection, child_connection = context.Pipe()
         self._process = context.Process(
-            target=_serve, args=(child_connection, factory, arguments), daemon=True
+            target=_serve, args=(child_connection, factory, arguments), daemon=not is_parent
         )
         self._process.start()
         child_connection.close()

@@ -59,6 +59,24 @@ def report(
 
 
 @app.command()
+def cost(
+    experiment: Annotated[str, typer.Argument(help="Published comparison.")] = "paper",
+    places: Annotated[
+        list[int] | None, typer.Option(help="Cores or GPUs, each with one run; repeatable.", min=1)
+    ] = None,
+    speedup: Annotated[float, typer.Option(help="Speed of a place, in cores of the published runs.")] = 1.0,
+    price: Annotated[float, typer.Option(help="Price of one place for an hour.", min=0)] = 0.0,
+) -> None:
+    """Reckon time and money of an experiment's trainings on other machines, from the seconds that they took."""
+    from .cost import reckon_cost
+
+    for number in places or (2, 64):
+        reckoned = reckon_cost(experiment, number, speedup)
+        money = f", {number * reckoned.hours * price:.2f} for all places" if price else ""
+        print(f"{number} places: {reckoned.hours:.1f} h ({reckoned.run_hours:.1f} h of runs){money}")
+
+
+@app.command()
 def pages() -> None:
     """Write the pages of docs/ that are computed."""
     from .pages.render import write_pages
