@@ -176,3 +176,16 @@ def test_folder_without_readable_files_is_an_error(run: Run, tmp_path: Path) -> 
     assert (code, out) == (1, "")
     assert err.splitlines()[-1].startswith("doorstate: ")
     assert str(tmp_path) in err
+
+
+def test_processes_give_the_same_scores(run: Run, recordings: Path) -> None:
+    (_, alone, _), (code, together, _) = (
+        run("evaluate", recordings, "--rule", "plane_state", "--json", *options)
+        for options in ((), ("--workers", "2"))
+    )
+    assert code == 1, "one image cannot be read"
+    assert together == alone
+
+
+def test_a_cluster_needs_a_folder(run: Run, recordings: Path) -> None:
+    check_error(run("evaluate", recordings, "--engine", "ray", "--address", "auto"), 2, "--out")

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Annotated, NamedTuple
@@ -31,7 +32,10 @@ _Address = Annotated[
         help="Running cluster of --engine ray: auto or HOST:PORT. [default: RAY_ADDRESS, or this machine alone]"
     ),
 ]
-_Workers = Annotated[int | None, typer.Option(help="Worker processes. [default: one a processor]", min=1)]
+_Workers = Annotated[
+    int | None,
+    typer.Option(help="Worker processes. [default: one a processor; in evaluate, this one]", min=1),
+]
 
 
 class EngineOptions(NamedTuple):
@@ -41,6 +45,11 @@ class EngineOptions(NamedTuple):
     address: str | None
     workers: int | None
     resources: Resources | None = None  # of each piece
+
+    @property
+    def is_cluster(self) -> bool:
+        """True if other machines may take part."""
+        return self.name == "ray" and bool(self.address or os.environ.get("RAY_ADDRESS"))
 
     @contextmanager
     def open(self) -> Iterator[Engine]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from doorstate.cli.engine_options import EngineOptions, with_engine_options
 from doorstate.cli.options import (
     AsJson,
     BudgetMs,
@@ -30,6 +31,7 @@ _DOOR_COLUMN = "door"
 
 
 @with_reading_options
+@with_engine_options
 def evaluate(
     folder: Annotated[
         Path,
@@ -66,6 +68,7 @@ def evaluate(
     layout: LayoutName = None,
     *,
     options: ReadOptions,
+    engine: EngineOptions,
 ) -> None:
     """Score networks and rules on labelled recordings.
 
@@ -87,14 +90,17 @@ def evaluate(
     from doorstate.cli.console import print_json, stderr
     from doorstate.cli.evaluate_output import PAGE, print_scores, write_frame_report
     from doorstate.cli.prediction_summary import print_errors
-    from doorstate.cli.predictors import Methods, load_predictors
+    from doorstate.cli.predictors import Methods, arguments_of, load_predictors
     from doorstate.cli.progress import progress_bar
     from doorstate.dataset.labelled import check_column, labelled_frames
+    from doorstate.evaluation.frame_pieces import evaluate_frames_in_pieces
     from doorstate.evaluation.frame_tables import NO_GROUP, frame_notes, frame_tables
     from doorstate.evaluation.frames import evaluate_frames
 
     if all_frames and out is None:
         raise ConfigError("--all needs --out")
+    if engine.is_cluster and out is None:
+        raise ConfigError("machines of a cluster need a folder that they share", field="out")
     check_layout(layout, options)
     frames = labelled_frames(folder, options, layout)
     if group is None and any(frame.columns.get(_DOOR_COLUMN) for frame in frames):
@@ -104,11 +110,15 @@ def evaluate(
     if out is not None:
         check_writable(out / PAGE)
     with nullcontext() if out is None else owned_folder(out):
-        predictors = load_predictors(
-            Methods(network, weights, rule), points, budget_ms=budget_ms, threads=threads, device=device
-        )
-        with progress_bar("Predicting") as progress:
-            results = evaluate_frames(predictors, frames, progress)
+        methods = Methods(network, weights, rule)
+        predictors = load_predictors(methods, points, budget_ms=budget_ms, threads=threads, device=device)
+        if engine.name == "processes" and engine.workers is None:
+            with progress_bar("Predicting") as progress:
+                results = evaluate_frames(predictors, frames, progress)
+        else:
+            arguments = arguments_of(predictors, methods, threads, device)
+            with engine.open() as workers, progress_bar("Predicting") as progress:
+                results = evaluate_frames_in_pieces(arguments, frames, workers, out, progress)
         print_errors([(frame.file, reason) for frame, reason in results.unreadable], "file")
         if not results.frames:
             raise CloudReadError(f"none of {len(frames)} files could be read", path=folder)

@@ -3,14 +3,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from doorstate.cli.choices import split_names
 from doorstate.errors import ConfigError, is_installed
 
 if TYPE_CHECKING:
+    from doorstate.evaluation.frame_pieces import PredictorArguments
     from doorstate.inference.predictor import Predictor
 
 
@@ -89,6 +90,27 @@ def load_predictors(
         _warn_about_points(name, predictor, points)
         predictors[name] = predictor
     return predictors
+
+
+def arguments_of(
+    predictors: Mapping[str, Predictor], methods: Methods, threads: int | None, device: str
+) -> PredictorArguments:
+    """Return how other processes load the same predictors, with the points that they have here."""
+    from doorstate.evaluation.frame_pieces import PredictorArguments
+    from doorstate.inference.network_predictor import NetworkPredictor
+
+    arguments: dict[str, dict[str, Any]] = {}
+    for name, choice in methods.choices().items():
+        predictor = predictors[name]
+        if isinstance(predictor, NetworkPredictor):
+            arguments[name] = {
+                "name_or_path": choice if isinstance(choice, str) else Path(str(choice)).absolute(),
+                "num_points": predictor.num_points,
+                "device": device,
+            }
+        else:
+            arguments[name] = {"rule": name}
+    return PredictorArguments(arguments, threads or 1)
 
 
 def load_predictor(
