@@ -233,14 +233,18 @@ def engines(
     pieces: Annotated[int, typer.Option(help="Pieces that do nothing.", min=1)] = 100_000,
     seconds: Annotated[int, typer.Option(help="Pieces of a second for each worker.", min=1)] = 10,
     repeats: Repeats = 3,
+    engines: Annotated[str, typer.Option(help="Engines, separated by commas.")] = "processes,ray",
 ) -> None:
     """Start, overhead, gain of a second worker and very many pieces of both engines: processes and Ray."""
-    from benchmarks.engines import EngineBenchmark, engines_table, measure_engines
+    from benchmarks.engines import ENGINES, EngineBenchmark, engines_table, measure_engines
     from doorstate.cli.progress import progress_bar
 
+    names = [name.strip() for name in engines.split(",")]
+    if not set(names) <= set(ENGINES):
+        raise ConfigError(f"cannot use {engines!r}", field="engines", expected=" or ".join(ENGINES))
     plan = EngineBenchmark(scenes, pieces, seconds, repeats)
     with progress_bar("engines") as progress:
-        rows = measure_engines(plan, progress)
+        rows = measure_engines(plan, names, progress)
     store_results(out, "engines", rows, engines_table(rows), **plan._asdict())
 
 

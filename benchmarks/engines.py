@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from statistics import median
@@ -37,10 +37,16 @@ class EngineBenchmark(NamedTuple):
     repeats: int
 
 
-def measure_engines(plan: EngineBenchmark, progress: Progress) -> list[Result]:
-    """Return one row for each engine; engines take turns within every measurement."""
-    turns = [(turn, engine) for turn in range(plan.repeats) for engine in ENGINES]
-    values: dict[str, dict[str, list[float]]] = {engine: {} for engine in ENGINES}
+def measure_engines(plan: EngineBenchmark, engines: Sequence[str], progress: Progress) -> list[Result]:
+    """Return one row for each engine; engines take turns.
+
+    Args:
+        plan: sizes.
+        engines: some of `ENGINES`, of which the first is what others are compared with.
+        progress: called with finished and all turns.
+    """
+    turns = [(turn, engine) for turn in range(plan.repeats) for engine in engines]
+    values: dict[str, dict[str, list[float]]] = {engine: {} for engine in engines}
     for done, (_, engine) in enumerate(turns):
         progress(done, len(turns))
         # A process of its own: Ray stays in memory, and peaks of memory are those of one engine.
@@ -54,9 +60,9 @@ def measure_engines(plan: EngineBenchmark, progress: Progress) -> list[Result]:
     progress(len(turns), len(turns))
     rows: list[Result] = []
     for engine, lists in values.items():
-        pairs = zip(lists["seconds_s"], values["processes"]["seconds_s"], strict=True)
+        pairs = zip(lists["seconds_s"], values[engines[0]]["seconds_s"], strict=True)
         row: dict[str, Any] = {"engine": engine} | {name: median(numbers) for name, numbers in lists.items()}
-        rows.append(row | {"ratio_to_processes": median(own / other for own, other in pairs)})
+        rows.append(row | {"ratio_to_first": median(own / other for own, other in pairs)})
     return rows
 
 
@@ -146,7 +152,7 @@ def engines_table(rows: list[Result]) -> Table:
         "engine": lambda row: str(row["engine"]),
         "start, s": lambda row: f"{row['start_s']:.1f}",
         "overhead": lambda row: f"{row['overhead']:.1%}",
-        "×": lambda row: f"{row['ratio_to_processes']:.3f}",
+        "×": lambda row: f"{row['ratio_to_first']:.3f}",
         "one worker, s": lambda row: f"{row['one_worker_s']:.1f}",
         "two workers, s": lambda row: f"{row['two_workers_s']:.1f}",
         "share of linear": lambda row: f"{row['linear']:.2f}",

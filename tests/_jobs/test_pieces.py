@@ -69,9 +69,13 @@ def test_errors_are_raised_as_they_are_and_finished_pieces_are_kept(tmp_path: Pa
         "piece",
     )
     assert (caught.value.expected, caught.value.hint) == ("0 or more", "try 3")
-    assert [path.exists() for path in paths] == [True, True, True, False]
+    assert not paths[3].exists()
+    kept = [path for path in paths if path.exists()]
+    for path in kept:
+        path.write_text("kept", encoding="utf-8")
     run_pieces(square_of_positive, [1, 2, 5, 3], paths, engine)
     assert paths[3].read_text(encoding="utf-8") == "9"
+    assert all(path.read_text(encoding="utf-8") == "kept" for path in kept)
 
 
 def test_folders_may_be_relative(tmp_path: Path, engine: Engine, monkeypatch: pytest.MonkeyPatch) -> None:
