@@ -147,8 +147,13 @@ def read_csv(path: Path) -> list[dict[str, str]]:
     Raises:
         DatasetError: the file is missing, too large or no text, or a line has more or fewer columns than the header.
     """
+    rows: list[dict[str, str]] = []
+    before: dict[str, str] = {}
     try:
-        rows = list(csv.DictReader(io.StringIO(read_table_text(path), newline=""), strict=True))
+        for row in csv.DictReader(io.StringIO(read_table_text(path), newline=""), strict=True):
+            # Lines of one scene repeat most texts, which would fill half of the memory.
+            before = {name: before[name] if before.get(name) == text else text for name, text in row.items()}
+            rows.append(before)
     except (OSError, EOFError, zlib.error, UnicodeDecodeError, csv.Error) as error:
         raise DatasetError(f"cannot be read as CSV ({error})", path=path) from error
     for number, row in enumerate(rows, start=2):
