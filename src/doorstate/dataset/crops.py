@@ -57,17 +57,20 @@ def clean_and_find(cloud: Points, without_outliers: bool) -> tuple[Points, list[
 
 def candidate_columns(row: Row, candidates: Sequence[Doorway], crops: Crops) -> list[tuple[Doorway, Columns]]:
     """Return the doorways to crop a simulated frame at, and the columns of their crops that differ from its line."""
+    of_frame = flatten(row)
     if crops.kept == "best":
         main = next(iter(true_doors(row)), None)
-        return [(doorway, _columns(row, doorway, main, row.sample_id, "0")) for doorway in candidates[:1]]
+        return [
+            (doorway, _columns(of_frame, doorway, main, row.sample_id, "0")) for doorway in candidates[:1]
+        ]
     chosen = [
-        (doorway, _columns(row, doorway, hit_door(row, doorway), f"{row.sample_id}-c{rank}", str(rank)))
+        (doorway, _columns(of_frame, doorway, hit_door(row, doorway), f"{row.sample_id}-c{rank}", str(rank)))
         for rank, doorway in enumerate(candidates)
     ]
     if crops.add_missed:
         doorways = _missed(row, candidates)
         chosen += [
-            (doorway, _columns(row, doorway, door, f"{row.sample_id}-a{number}", ADDED))
+            (doorway, _columns(of_frame, doorway, door, f"{row.sample_id}-a{number}", ADDED))
             for number, (doorway, door) in enumerate(doorways)
         ]
     return chosen
@@ -126,14 +129,15 @@ def _missed(row: Row, candidates: Sequence[Doorway]) -> list[tuple[Doorway, True
     return missed
 
 
-def _columns(row: Row, doorway: Doorway, door: TrueDoor | None, sample_id: str, candidate: str) -> Columns:
+def _columns(
+    of_frame: Columns, doorway: Doorway, door: TrueDoor | None, sample_id: str, candidate: str
+) -> Columns:
     """Return the columns of a crop that shows a door, or none, in place of those of its frame."""
-    of_frame = flatten(row)
     in_crop = {name: _text(value) for name, value in _door_columns(door, doorway).items()}
     return {
         "sample_id": sample_id,
         **in_crop,
-        **_candidate_columns(row.sample_id, doorway, candidate),
+        **_candidate_columns(of_frame["sample_id"], doorway, candidate),
         **{f"{_FRAME}{name}": of_frame[name] for name in in_crop},
     }
 

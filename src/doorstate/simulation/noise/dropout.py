@@ -46,7 +46,8 @@ def lose_speckle(depth_m: DepthImage, speckle: Speckle, rng: np.random.Generator
     # A pixel survives if none of the side^2 squares that could cover it is drawn.
     chance = -math.expm1(math.log1p(-speckle.share) / side**2)
     corners = rng.random((height + side - 1, width + side - 1), dtype=np.float32) < np.float32(chance)
-    rows, columns = np.nonzero(corners)
+    # Searching a plane takes ten times as long.
+    rows, columns = np.divmod(np.flatnonzero(corners), corners.shape[1])
     kept = depth_m.copy()
     for row, column in zip(rows.tolist(), columns.tolist(), strict=True):
         kept[max(row - side + 1, 0) : row + 1, max(column - side + 1, 0) : column + 1] = np.nan

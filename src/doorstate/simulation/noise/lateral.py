@@ -48,8 +48,8 @@ def draw_moves(
     aside = rng.standard_normal((2, len(targets)), dtype=np.float32)
     aside *= lateral.sigma_px(incidence_rad.ravel()[targets])
     step = np.rint(np.clip(aside, -lateral.reach_px, lateral.reach_px)).astype(np.int64)
-    row = np.clip(targets // width + step[0], 0, height - 1)
-    column = np.clip(targets % width + step[1], 0, width - 1)
+    row, column = np.divmod(targets, width)
+    row, column = np.clip(row + step[0], 0, height - 1), np.clip(column + step[1], 0, width - 1)
     sources = row * width + column
     box = rendered.box.ravel()
     moved = box[sources] != box[targets]
@@ -66,7 +66,7 @@ def _edges(box: NDArray[np.int16]) -> NDArray[np.bool_]:
 def _widened(mask: NDArray[np.bool_], reach: int) -> NDArray[np.bool_]:
     for axis in (0, 1):
         mask = np.moveaxis(mask, axis, 0)
-        wide = mask.copy()
+        wide = mask.copy(order="K")
         for shift in range(1, reach + 1):
             wide[shift:] |= mask[:-shift]
             wide[:-shift] |= mask[shift:]

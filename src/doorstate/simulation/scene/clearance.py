@@ -6,12 +6,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import chain
 
+import numpy as np
+
 from doorstate.simulation.scene.box import Box, mirror
 from doorstate.simulation.scene.door import Door, Opening
 from doorstate.simulation.scene.door_boxes import fixed_boxes, frame_and_leaf_boxes, leaf_boxes, turn_leaf
 from doorstate.simulation.scene.folding import folding_panels
 from doorstate.simulation.scene.leaf import leaf_slab, leaf_widths_m, sliding_overlap_m
-from doorstate.simulation.scene.plan import collide, distance_m
+from doorstate.simulation.scene.plan import colliding, distance_m
 from doorstate.types import Part
 
 _WIDEST_DEG, _STEP_DEG = 170, 5
@@ -52,11 +54,11 @@ def passable_width_m(door: Door, opening: Opening) -> float:
 
 def free_angle_deg(door: Door, obstacles: list[Box]) -> int:
     """Return the angle, up to 170 degrees in steps of 5, by which the leaves turn until they hit something fixed."""
-    fixed = [*fixed_boxes(door), *obstacles]
-    for angle in range(_STEP_DEG, _WIDEST_DEG + 1, _STEP_DEG):
-        if collide(leaf_boxes(door, Opening(angle_deg=angle, passive_angle_deg=angle)), fixed):
-            return angle - _STEP_DEG
-    return _WIDEST_DEG
+    angles_deg = range(_STEP_DEG, _WIDEST_DEG + 1, _STEP_DEG)
+    turned = [leaf_boxes(door, Opening(angle_deg=angle, passive_angle_deg=angle)) for angle in angles_deg]
+    hits = colliding([*chain.from_iterable(turned)], [*fixed_boxes(door), *obstacles])
+    angle_of_box = np.repeat(angles_deg, [len(boxes) for boxes in turned])
+    return int(angle_of_box[hits].min(initial=_WIDEST_DEG + _STEP_DEG)) - _STEP_DEG
 
 
 def keep_out_boxes(door: Door, openings: Sequence[Opening]) -> list[Box]:
