@@ -39,7 +39,7 @@ _STAGES: dict[str, tuple[object, str]] = {
 }
 STAGES = (*_STAGES, "other", "total", "processor")
 _NOTE = (
-    "Milliseconds of a frame in one process, mean: *draw* a scene, *render* it, what its states share once, "
+    "Milliseconds of a frame in one process, mean: *draw* a scene, *render* it (what its states share once), "
     "*sense*, remove *outliers*, *find* doorways, cut and sample *crops*, *save* them, write *rows* of the manifest, "
     "*join* all pieces. *Processor* is the time of all threads together, *bytes* are those of a crop on disk with its "
     "line of the manifest, *memory* is the peak of the process in MiB."

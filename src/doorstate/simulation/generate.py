@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from doorstate.simulation.camera import DepthCamera
 from doorstate.simulation.frames import Frame, depth_sha256, replay_pose
 from doorstate.simulation.noise.model import conditions_for
@@ -32,7 +34,7 @@ def simulate_rows(
     described = []
     for row, frame, image in zip(rows, frames, clean, strict=True):
         columns: dict[str, object] = {
-            "measured_px": int((frame.cut.part != Part.NONE).sum()),
+            "measured_px": int(np.count_nonzero(frame.cut.part != Part.NONE)),
             "same_image_as": _same_images(row, image, rows, clean),
             "depth_sha256": depth_sha256(frame),
         }

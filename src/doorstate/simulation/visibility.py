@@ -76,9 +76,9 @@ def count_visible(full: Render, cut: Render, numbers: range, opening_m: DepthIma
     """
     own = (cut.box >= numbers.start) & (cut.box < numbers.stop)
     return VisiblePixels(
-        leaf=int((own & (cut.part == Part.LEAF)).sum()),
-        frame=int((own & (cut.part == Part.FRAME)).sum()),
-        opening=int(looks_into(full.depth_m, opening_m).sum()),
+        leaf=int(np.count_nonzero(own & (cut.part == Part.LEAF))),
+        frame=int(np.count_nonzero(own & (cut.part == Part.FRAME))),
+        opening=int(np.count_nonzero(looks_into(full.depth_m, opening_m))),
     )
 
 
