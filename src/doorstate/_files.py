@@ -152,7 +152,8 @@ def read_csv(path: Path) -> list[dict[str, str]]:
     try:
         for row in csv.DictReader(io.StringIO(read_table_text(path), newline=""), strict=True):
             # Lines of one scene repeat most texts, which would fill half of the memory.
-            before = {name: before[name] if before.get(name) == text else text for name, text in row.items()}
+            repeated = {name for name, text in before.items() if row.get(name) == text}
+            before = {name: before[name] if name in repeated else text for name, text in row.items()}
             rows.append(before)
     except (OSError, EOFError, zlib.error, UnicodeDecodeError, csv.Error) as error:
         raise DatasetError(f"cannot be read as CSV ({error})", path=path) from error

@@ -52,11 +52,11 @@ def render_states(states: Sequence[Sequence[Box]], pose: CameraPose, intrinsics:
     """Return `render_behind_glass` of lists of boxes; what they have in common is drawn once.
 
     Args:
-        states: boxes of each state of a scene. Lists of one length share the boxes that are the same in all of them.
+        states: boxes of each state of a scene. Lists of the same materials share the boxes that are the same in all.
         pose: camera in the door frame.
         intrinsics: pinhole model of the camera.
     """
-    if len({len(boxes) for boxes in states}) > 1:
+    if len({tuple(box.material for box in boxes) for boxes in states}) > 1:
         return [render_behind_glass(boxes, pose, intrinsics) for boxes in states]
     shared = [len({(type(box), box) for box in versions}) == 1 for versions in zip(*states, strict=True)]
     opaque = [box.material != "glass" for box in states[0]]
