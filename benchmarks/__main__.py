@@ -178,7 +178,7 @@ def simulation(
     out: Out,
     presets: Annotated[
         str, typer.Option(help="Presets with their sensors, as preset:sensor, separated by commas.")
-    ] = "varied:xtion",
+    ] = "varied:xtion,building:xtion-matching",
     scenes: Annotated[int, typer.Option(help="Scenes of each preset.", min=1)] = 60,
     points: Annotated[int, typer.Option(help="Points per crop.", min=128)] = 1024,
     device: Annotated[str, typer.Option(help="Device of batched rendering: cpu, cuda, ...")] = "cpu",

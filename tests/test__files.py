@@ -13,7 +13,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from doorstate._files import atomic_path, check_writable, is_vacant, read_csv, write_csv, write_text
+from doorstate._files import (
+    atomic_path,
+    check_writable,
+    is_vacant,
+    read_csv,
+    write_compressed_text,
+    write_csv,
+    write_text,
+)
 from doorstate.errors import DatasetError, OutputError
 
 
@@ -171,3 +179,26 @@ def test_other_files_are_dataset_errors(tmp_path: Path, content: bytes | None) -
 def test_a_table_saved_by_a_spreadsheet_has_the_same_columns(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("file,state\na.pcd,open\n", encoding="utf-8-sig")
     assert read_csv(tmp_path / "a.csv") == [{"file": "a.pcd", "state": "open"}]
+
+
+def test_tables_and_lines_beyond_the_limits_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_text(tmp_path / "a.csv", "a,b\n1,22\n")
+    write_compressed_text(tmp_path / "a.csv.gz", "a,b\n" + 30 * "1,22\n")
+    assert read_csv(tmp_path / "a.csv") == [{"a": "1", "b": "22"}]
+    assert len(read_csv(tmp_path / "a.csv.gz")) == 30
+    monkeypatch.setattr("doorstate._files._MAX_LINE", 4)
+    with pytest.raises(DatasetError):
+        read_csv(tmp_path / "a.csv")
+    monkeypatch.setattr("doorstate._files._MAX_LINE", 100)
+    monkeypatch.setattr("doorstate._files.MAX_TABLE_BYTES", 120)
+    with pytest.raises(DatasetError):
+        read_csv(tmp_path / "a.csv.gz")
+
+
+def test_equal_texts_of_neighbouring_lines_are_one_object(tmp_path: Path) -> None:
+    write_text(tmp_path / "a.csv", "a,b\nscene,1\nscene,2\nother,2\n")
+    first, second, third = read_csv(tmp_path / "a.csv")
+    assert first["a"] is second["a"]
+    assert [row["a"] for row in (first, second, third)] == ["scene", "scene", "other"]

@@ -194,7 +194,7 @@ def test_time_to_every_door_is_the_sum_of_its_stages(tmp_path: Path) -> None:
 
 
 def test_time_of_a_simulated_frame_is_the_sum_of_its_stages(tmp_path: Path) -> None:
-    few = ("--scenes", "1", "--batches", "1,2", "--device", "cpu")
+    few = ("--presets", "varied:xtion", "--scenes", "1", "--batches", "1,2", "--device", "cpu")
     code, _, errors = run("simulation", "--out", tmp_path, *few)
     assert (code, errors) == (0, "")
     _, rows, markdown = read_results(tmp_path, "simulation")

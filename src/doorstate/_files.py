@@ -22,6 +22,7 @@ from pathlib import Path
 from doorstate._input import MAX_TABLE_BYTES, open_input
 from doorstate.errors import DatasetError, OutputError
 
+_MAX_LINE = 1 << 24  # of a table: a scene of a manifest takes some thousands
 LOCK_PREFIX = ".doorstate"  # of the files that `_locks` keeps in a folder
 _NOT_UTF_8 = "backslashreplace"  # names of files may hold such bytes
 _SCRATCH = re.compile(rf"\.[0-9a-f]+\.tmp\..+|{re.escape(LOCK_PREFIX)}.*\.(lock|owner)")
@@ -150,7 +151,7 @@ def read_csv(path: Path) -> list[dict[str, str]]:
     rows: list[dict[str, str]] = []
     before: dict[str, str] = {}
     try:
-        for row in csv.DictReader(io.StringIO(read_table_text(path), newline=""), strict=True):
+        for row in csv.DictReader(_table_lines(path), strict=True):
             # Lines of one scene repeat most texts, which would fill half of the memory.
             repeated = {name for name, text in before.items() if row.get(name) == text}
             before = {name: before[name] if name in repeated else text for name, text in row.items()}
@@ -161,6 +162,26 @@ def read_csv(path: Path) -> list[dict[str, str]]:
         if None in row or None in row.values():
             raise DatasetError(f"line {number} has another number of columns than the header", path=path)
     return rows
+
+
+def _table_lines(path: Path) -> Iterator[str]:
+    """Yield the lines of a table one after another, so that its text is never in memory as a whole.
+
+    Errors are those of `read_table_text`.
+    """
+    rest = MAX_TABLE_BYTES
+    with open_input(path, MAX_TABLE_BYTES, DatasetError) as stream:
+        unpacked = gzip.GzipFile(fileobj=stream) if path.suffix == ".gz" else stream
+        text = io.TextIOWrapper(unpacked, encoding="utf-8-sig", newline="")
+        while line := text.readline(min(rest, _MAX_LINE) + 1):
+            rest -= len(line)
+            if rest < 0 or len(line) > _MAX_LINE:
+                raise _too_large(path)
+            yield line
+
+
+def _too_large(path: Path) -> DatasetError:
+    return DatasetError("is too large", path=path, expected=f"at most {MAX_TABLE_BYTES} bytes of text")
 
 
 def read_table_text(path: Path) -> str:
@@ -174,5 +195,5 @@ def read_table_text(path: Path) -> str:
         unpacked = gzip.GzipFile(fileobj=stream) if path.suffix == ".gz" else stream
         content = unpacked.read(MAX_TABLE_BYTES + 1)
     if len(content) > MAX_TABLE_BYTES:
-        raise DatasetError("is too large", path=path, expected=f"at most {MAX_TABLE_BYTES} bytes of text")
+        raise _too_large(path)
     return content.decode("utf-8-sig")

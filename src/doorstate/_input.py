@@ -13,7 +13,7 @@ from typing import BinaryIO
 from doorstate.errors import CloudReadError, DoorstateError
 
 MAX_SETTINGS_BYTES = 1 << 20  # of an experiment, a card, a description: written by hand or of a few kB
-MAX_TABLE_BYTES = 1 << 30  # of a manifest, an index, a table of predictions, also unpacked
+MAX_TABLE_BYTES = 1 << 31  # of a manifest, an index, a table of predictions, also unpacked
 
 _KINDS: tuple[tuple[Callable[[int], bool], str], ...] = (
     (stat.S_ISDIR, "a folder"),
