@@ -77,6 +77,7 @@ COMMANDS = {
     ("info", "--json"): None,
     ("simulate", "--out", "data", "--poses", "3", "--workers", "1", "--keep", "pcd"): None,
     ("prepare", "pcds", "--out", "prepared", "--points", "128", "--workers", "1"): None,
+    ("simulate", "--out", "data", "--poses", "3", "--engine", "ray"): "cluster",
     ("train", "--help"): None,
     ("train", "--network", "pointnet", "--data", "data", "--out", "run"): "train",
     ("compare", "experiment.toml"): "train",
