@@ -2,7 +2,8 @@
 """Corrupted crops for training: losses, and things of a crop without a door before or beside another's doorway.
 
 The label of a mixed crop stays true: nothing is put into the opening or the sweep of a leaf, and all things are on one
-side of the opening's middle. Points behind a thing stay, as if seen from elsewhere.
+side of the opening's middle, mirrored where most of them stood on the other. Points behind a thing stay, as if seen
+from elsewhere.
 """
 
 from __future__ import annotations
@@ -71,12 +72,10 @@ class Corruptor:
         """
         self._corruption, self._points, self._parts = corruption, points, parts
         self._openings, self._scale_m = openings, scale_m
-        self._donors = self._things = None
+        self._donors = None
         if corruption.mix and parts is not None:
-            things = parts == Part.OTHER
-            self._donors = np.flatnonzero(~has_door & (things.sum(axis=1) >= _FEWEST_POINTS))
-            self._things = things[self._donors]
-        if corruption.mix and (self._donors is None or len(self._donors) == 0):
+            self._donors = _find_donors(points, parts, has_door, scale_m)
+        if corruption.mix and (self._donors is None or len(self._donors.rows) == 0):
             raise ConfigError(
                 "no sample without a door shows things to mix", field="corruption", hint="set mix to 0"
             )
@@ -96,13 +95,16 @@ class Corruptor:
         points, parts = self._points[rows], None if self._parts is None else self._parts[rows]
         kept = kept_points(points, draw)
         mixed = np.flatnonzero(~np.isnan(draw.donors))
-        if self._donors is not None and self._things is not None and len(mixed):
-            chosen = (draw.donors[mixed] * len(self._donors)).astype(np.int64) % len(self._donors)
+        if self._donors is not None and len(mixed):
+            chosen = (draw.donors[mixed] * len(self._donors.rows)).astype(np.int64) % len(self._donors.rows)
+            donors, sides = self._donors.rows[chosen], draw.sides[mixed]
             given, things = np.zeros_like(points), np.zeros_like(kept)
-            donors, openings = self._donors[chosen], self._openings.at(rows[mixed])
             given[mixed] = self._points[donors]
-            things[mixed] = self._things[chosen] & (donors != rows[mixed])[:, None]
-            things[mixed] &= beside_opening(given[mixed], openings, draw.sides[mixed], self._scale_m)
+            given[mixed, :, 0] *= (sides * self._donors.sides[chosen])[:, None]
+            things[mixed] = self._donors.things[chosen] & (donors != rows[mixed])[:, None]
+            things[mixed] &= beside_opening(
+                given[mixed], self._openings.at(rows[mixed]), sides, self._scale_m
+            )
             things &= things.cumsum(axis=1) <= MOST_PASTED * count
             # Point k of either crop is about as far from those before it, so that both orders run side by side.
             points, kept = _in_turn(points, given), _in_turn(kept, things)
@@ -111,6 +113,21 @@ class Corruptor:
         taken = first_kept(kept, count)
         points = np.take_along_axis(points, taken[..., None], axis=1)
         return points, None if parts is None else np.take_along_axis(parts, taken, axis=1)
+
+
+class _Donors(NamedTuple):
+    """Crops without a door by row number, the points of things before the wall, and the side of most of these."""
+
+    rows: Indices  # (D,)
+    things: Mask  # (D, S)
+    sides: NDArray[np.float32]  # (D,) 1 or -1
+
+
+def _find_donors(points: Points, parts: Parts, has_door: Mask, scale_m: float) -> _Donors:
+    things = (parts == Part.OTHER) & (points[..., 1] >= np.float32(CLEARANCE_M / scale_m))
+    rows = np.flatnonzero(~has_door & (things.sum(axis=1) >= _FEWEST_POINTS))
+    along = (points[rows, :, 0] * things[rows]).sum(axis=1)
+    return _Donors(rows, things[rows], np.where(along < 0, np.float32(-1), np.float32(1)))
 
 
 def beside_opening(points: Points, openings: Openings, sides: NDArray[np.float32], scale_m: float) -> Mask:
