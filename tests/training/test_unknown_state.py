@@ -93,7 +93,7 @@ def test_scores_of_states_leave_them_out(relabel: Relabel) -> None:
     network = create_network("pointnet")
     add_heads(network, ("door",))
     loader = CloudLoader(dataset, dataset.sample_ids, 128, heads=("door",))
-    outputs = network_outputs(network, loader, create_fabric(Recipe(name="common")))
+    outputs = network_outputs(network, loader, create_fabric(Recipe(name="common"), torch.device("cpu")))
     assert outputs.has_state.tolist() == (dataset.labels < 3).tolist()
     assert len(outputs.head_values["door"]) == len(dataset)
     right = outputs.probabilities.argmax(1)[dataset.labels < 3] == dataset.labels[dataset.labels < 3]

@@ -27,7 +27,7 @@ from doorstate.cli.options import (
 from doorstate.errors import ConfigError
 
 if TYPE_CHECKING:
-    from doorstate._jobs import Engine, Resources
+    from doorstate._jobs import Resources, WorkersOrEngine
     from doorstate.training.experiment import Experiment
 
 
@@ -105,9 +105,14 @@ def compare(
 
 
 def compare_with_display(
-    experiment: Experiment, folder: Path, engine: Engine, resources: Resources | None, device: str = "auto"
+    experiment: Experiment,
+    folder: Path,
+    jobs: WorkersOrEngine = 1,
+    resources: Resources | None = None,
+    device: str = "auto",
 ) -> list[dict[str, Any]]:
     """Run a comparison with a live display of its progress, and return the metrics of each run."""
+    from doorstate._jobs import engine_of
     from doorstate._locks import owned_folder
     from doorstate.cli.run_display import live_runs
     from doorstate.training.comparison import compare as run_comparison
@@ -115,6 +120,7 @@ def compare_with_display(
 
     recipes = {network: experiment.recipe_of(network) for network in experiment.networks}
     runs = plan_runs(experiment, folder)
+    engine = engine_of(jobs)
     at_once = engine.at_once(resources)
     with owned_folder(folder), live_runs(runs, recipes, experiment.num_points, at_once) as progress:
         return run_comparison(experiment, folder, engine, progress, resources, device)
