@@ -13,7 +13,7 @@ HOUR_S = 3600
 
 
 class Cost(NamedTuple):
-    """Runs on a machine with so many places for one run each."""
+    """A machine, and the number of runs that it does at the same time."""
 
     places: int
     hours: float  # until the last run is done

@@ -90,7 +90,7 @@ def test_one_scene_is_too_few() -> None:
 
 
 def test_equal_probabilities_are_answered_or_refused_together() -> None:
-    """Of 400 answers at 0.8 ten are wrong: too many, so all 400 are refused and no more."""
+    """Ten of the 400 answers at 0.8 are wrong, which is too many: these 400 are refused, and no others."""
     confidence = np.repeat([0.99, 0.8], 400)
     correct = np.ones(800, bool)
     correct[400:430] = False

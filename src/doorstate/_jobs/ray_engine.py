@@ -11,7 +11,6 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
-from unittest.mock import patch
 
 from doorstate import __version__
 from doorstate._jobs.pieces import MAX_RETRIES, Work
@@ -132,6 +131,8 @@ class RayEngine:
         # Read when the module is imported, and by all processes that it starts.
         os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
         os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")
+        from unittest.mock import patch  # slow to import
+
         import ray
 
         if ray.is_initialized():

@@ -63,7 +63,7 @@ def evaluate_frames_in_pieces(
     with tempfile.TemporaryDirectory(prefix=".doorstate-", dir=folder) as scratch:
         paths = piece_paths(Path(scratch), len(pieces), ".pickle")
         run_pieces(_evaluate_piece, pieces, paths, engine, progress)
-        # Written a moment ago by this program, in a folder that nobody else may write.
+        # Written just now by this program, in a folder that only its user may write.
         parts: list[FrameResults] = [pickle.loads(path.read_bytes()) for path in paths]
     return FrameResults(
         tuple(frame for part in parts for frame in part.frames),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What all optical sensors share: the view, its slopes and surfaces, and the light of the sensor's own emitter."""
+"""Parts of all optical sensors: the view, angles of incidence, surfaces, and the light of the sensor's own emitter."""
 
 from __future__ import annotations
 

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -117,13 +117,12 @@ def draw_fixture(
     top = plan.height_m if kind in _FULL_HEIGHT else bottom + stream.uniform(*sizes.height_m)
     count = max(1, round(width * sizes.count_per_m)) if sizes.count_per_m else 1
     count = stream.integer(3, 6) if kind == "shelves" else count
-    material: Material = "gloss" if kind in ("screen",) else stream.choice(_MATERIALS)
-    x_m, y_m, yaw_deg = turned(plan.on_wall(wall, along_m), _ORIGIN)
-    return Fixture(
+    material: Material = "gloss" if kind == "screen" else stream.choice(_MATERIALS)
+    return _at_wall(
+        plan,
+        wall,
+        along_m,
         kind=kind,
-        x_m=x_m,
-        y_m=y_m,
-        yaw_deg=yaw_deg,
         width_m=round(width, 4),
         depth_m=round(depth, 4),
         bottom_m=bottom,
@@ -131,6 +130,12 @@ def draw_fixture(
         count=count,
         material="dark" if kind == "screen" and stream.chance(0.5) else material,
     )
+
+
+def _at_wall(plan: Plan, wall: int, along_m: float, **fields: Any) -> Fixture:
+    """Return a fixture on a wall, with these fields besides its place."""
+    x_m, y_m, yaw_deg = turned(plan.on_wall(wall, along_m), _ORIGIN)
+    return Fixture(x_m=x_m, y_m=y_m, yaw_deg=yaw_deg, **fields)
 
 
 def clear_of(fixtures: list[Fixture], obstacles: Footprints) -> list[Fixture]:
@@ -169,13 +174,12 @@ def _draw_switch(stream: Stream, plan: Plan, door: WallDoor) -> Fixture:
     """Draw a light switch, or the button of a lift, beside a door."""
     side = 1.0 if stream.chance(0.5) else -1.0
     along = door.along_m + side * (door.door.half_width_m + stream.uniform(0.06, 0.3))
-    x_m, y_m, yaw_deg = turned(plan.on_wall(door.wall, along), _ORIGIN)
     low = stream.uniform(0.85, 1.15)
-    return Fixture(
+    return _at_wall(
+        plan,
+        door.wall,
+        along,
         kind="switch",
-        x_m=x_m,
-        y_m=y_m,
-        yaw_deg=yaw_deg,
         width_m=0.08,
         depth_m=stream.uniform(0.008, 0.03),
         bottom_m=low,
@@ -187,12 +191,11 @@ def _on_stretch(plan: Plan, wall: int, low: float, high: float) -> Callable[...,
     """Return a function that places a long fixture in the middle of a stretch of wall."""
 
     def at(kind: FixtureKind, width: float, depth: float, ends: tuple[float, float]) -> Fixture:
-        x_m, y_m, yaw_deg = turned(plan.on_wall(wall, (low + high) / 2), _ORIGIN)
-        return Fixture(
+        return _at_wall(
+            plan,
+            wall,
+            (low + high) / 2,
             kind=kind,
-            x_m=x_m,
-            y_m=y_m,
-            yaw_deg=yaw_deg,
             width_m=round(width, 4),
             depth_m=depth,
             bottom_m=ends[0],

@@ -12,7 +12,7 @@ from doorstate.simulation.noise.windows import Image, blobs
 
 
 class Holes(FrozenModel):
-    """How contrast decides on a match; 1 is the contrast that a window needs on average."""
+    """Holes where contrast is too weak to match; 1 is the contrast that a window needs on average."""
 
     spread: float = Field(default=0.5, ge=0)  # assumed: standard deviation of the contrast that is needed
     edge_lost: float = Field(
