@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Mapping
+from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
@@ -15,6 +16,11 @@ class FrozenModel(BaseModel):
     """Pydantic model without assignment, unknown fields, infinities and NaN."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+def without_defaults(fields: dict[str, Any], defaults: Mapping[str, Any]) -> dict[str, Any]:
+    """Return dumped fields without those, of the named ones, that have their default."""
+    return {name: value for name, value in fields.items() if name not in defaults or value != defaults[name]}
 
 
 def _check_order(values: tuple[float, float]) -> tuple[float, float]:

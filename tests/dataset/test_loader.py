@@ -149,7 +149,9 @@ def test_extra_data_sets_are_appended_as_a_whole(
 ) -> None:
     heads = ("door", "angle", "parts")
     selected = scene_dataset.sample_ids[5:9]
-    loader = CloudLoader(scene_dataset, selected, 128, heads=heads, extra_datasets=[more_dataset])
+    loader = CloudLoader(
+        scene_dataset, selected, 128, heads=heads, extra=[(more_dataset, more_dataset.sample_ids)]
+    )
     assert loader.sample_ids == [*selected, *more_dataset.sample_ids]
     (joined,) = loader.in_order(len(loader))
     separate = [

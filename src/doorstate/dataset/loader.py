@@ -74,7 +74,7 @@ class CloudLoader:
         num_points: int,
         find_neighbours: FindNeighbours | None = None,
         heads: Sequence[str] = (),
-        extra_datasets: Sequence[PreparedDataset] = (),
+        extra: Sequence[tuple[PreparedDataset, Sequence[str]]] = (),
         corruption: Corruption | None = None,
         device: torch.device = _CPU,
     ) -> None:
@@ -88,7 +88,7 @@ class CloudLoader:
                 change its result.
             heads: names of the heads that need targets; with "door" among them, samples without a door, and doors of
                 unknown state, are allowed and labelled `IGNORE_INDEX`.
-            extra_datasets: data sets to append as a whole.
+            extra: samples of other data sets to append.
             corruption: random losses of shuffled crops, which change neighbours. Lost points are replaced by later
                 ones where the data sets store more than `num_points`; the rest is repeated.
             device: device of the batches and of the search.
@@ -97,7 +97,7 @@ class CloudLoader:
             ConfigError: a data set has fewer points, samples have no state, the parts of points are not stored, or
                 whole clouds, whose centres depend on all points, are to be corrupted.
         """
-        selected = [(dataset, list(sample_ids)), *((extra, extra.sample_ids) for extra in extra_datasets)]
+        selected = [(dataset, sample_ids), *extra]
         self.sample_ids = [sample for _, samples in selected for sample in samples]
         corruption = None if corruption is None or corruption.changes_nothing else corruption
         if corruption is not None and dataset.normalization.centre_m is None:

@@ -210,6 +210,7 @@ def train_fold(
         start_from=_start_weights(experiment, network, fold),
         heads=experiment.heads_of(network),
         extra_train_datasets=extra_train_datasets,
+        train_share=experiment.train_share,
     )
     extra_datasets = [open_dataset(Path(path)) for path in extra_train_datasets]
     return train_run(config, dataset, _roles_of(splits_path, fold), folder, extra_datasets, device, ranks)

@@ -6,9 +6,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer
 
-from doorstate._models import FrozenModel, Name, Seed
+from doorstate._models import FrozenModel, Name, Seed, without_defaults
 from doorstate.clouds.preparation import MAX_NUM_POINTS, MIN_POINTS
 from doorstate.dataset.splits import NUM_FOLDS
 from doorstate.training.recipes import Recipe
@@ -28,6 +28,14 @@ class RunConfig(FrozenModel):
     start_from: str | None = None  # weights file to start from
     heads: tuple[str, ...] = ()  # heads besides the state (networks.heads)
     extra_train_datasets: tuple[str, ...] = ()  # all samples of these are trained on in addition to the fold
+
+    # Of the scenes that the fold and the other data sets train on.
+    train_share: float = Field(default=1.0, gt=0, le=1)
+
+    @model_serializer(mode="wrap")
+    def _leave_out_new_field(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        # So that runs of earlier versions go on.
+        return without_defaults(dump(self), {"train_share": 1.0})
 
     @property
     def all_network_options(self) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from doorstate.clouds.corruption import Corruption
 from doorstate.dataset.loader import CloudLoader
 from doorstate.dataset.neighbour_cache import FindNeighbours
 from doorstate.dataset.roles import Role
+from doorstate.dataset.shares import samples_of_share
 from doorstate.dataset.store import PreparedDataset
 from doorstate.errors import DatasetError
 from doorstate.types import STATES
@@ -37,6 +38,7 @@ class RunData:
         heads: Sequence[str],
         extra_datasets: Sequence[PreparedDataset] = (),
         device: torch.device | None = None,
+        train_share: float = 1.0,
     ) -> None:
         """Sort the samples.
 
@@ -46,21 +48,26 @@ class RunData:
             heads: names of heads; the loaders return their targets.
             extra_datasets: data sets of which all samples are trained on.
             device: device of the batches; None is the processor.
+            train_share: share of the scenes that are trained on.
 
         Raises:
             DatasetError: a role has too few samples, or none with a state.
         """
-        self.dataset, self.heads, self.extra_datasets = dataset, heads, extra_datasets
+        self.dataset, self.heads = dataset, heads
+        self.extra = [
+            (extra, samples_of_share(extra, extra.sample_ids, train_share)) for extra in extra_datasets
+        ]
         self.device = device or torch.device("cpu")
         self.samples: dict[Role, list[str]] = {
             role: [sample for sample, sample_role in roles.items() if sample_role == role] for role in _ROLES
         }
+        self.samples["train"] = samples_of_share(dataset, self.samples["train"], train_share)
         self._check_roles()
 
     @property
     def num_extra(self) -> int:
         """Number of samples of the additional data sets."""
-        return sum(len(dataset) for dataset in self.extra_datasets)
+        return sum(len(samples) for _, samples in self.extra)
 
     @property
     def num_train(self) -> int:
@@ -92,7 +99,7 @@ class RunData:
             num_points,
             find_neighbours if keep_train_neighbours else None,
             self.heads,
-            self.extra_datasets,
+            self.extra,
             corruption,
             self.device,
         )

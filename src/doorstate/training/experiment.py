@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from pydantic import Field, ValidationError
+from pydantic import Field, SerializerFunctionWrapHandler, ValidationError, model_serializer
 
 from doorstate._documents import read_toml
-from doorstate._models import FrozenModel, Name, Seed
+from doorstate._models import FrozenModel, Name, Seed, without_defaults
 from doorstate.clouds.preparation import MAX_NUM_POINTS, MIN_POINTS, NUM_POINTS
 from doorstate.dataset.splits import NUM_FOLDS, ONE_FOLD, PROTOCOLS, UNSEEN
 from doorstate.errors import ConfigError, first_validation_error
@@ -44,6 +44,12 @@ class Experiment(FrozenModel):
     start_from: str | None = None
     heads: tuple[str, ...] = ()  # heads besides the state, trained jointly
     extra_train_datasets: tuple[str, ...] = ()  # all samples are trained on in every fold, and never tested
+    train_share: float = Field(default=1.0, gt=0, le=1)  # of the scenes that are trained on
+
+    @model_serializer(mode="wrap")
+    def _leave_out_new_field(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        # So that comparisons of earlier versions go on.
+        return without_defaults(dump(self), {"train_share": 1.0})
 
     @property
     def methods(self) -> tuple[str, ...]:

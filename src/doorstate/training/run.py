@@ -100,7 +100,7 @@ def _train(
     check_unchanged()
     if ranks.agree(run.finished):
         return run.read_metrics()
-    data = RunData(dataset, roles, config.heads, extra_datasets, device)
+    data = RunData(dataset, roles, config.heads, extra_datasets, device, config.train_share)
     keep_freed_memory()
     fabric = create_fabric(config.recipe, device)
     with torch.random.fork_rng([device] if device.type == "cuda" else []):

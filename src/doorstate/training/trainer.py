@@ -239,7 +239,7 @@ class Trainer:
     def _card(self) -> WeightsCard:
         config, dataset = self.config, self.data.dataset
         source, normalization = dataset.description, dataset.normalization
-        extra = f", and {self.data.num_extra} additional samples" if self.data.extra_datasets else ""
+        extra = f", and {self.data.num_extra} additional samples" if self.data.extra else ""
         return WeightsCard(
             network=config.network,
             network_options=config.all_network_options,
