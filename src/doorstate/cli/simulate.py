@@ -32,14 +32,18 @@ def simulate(
         typer.Option(
             parser=PRESET,
             metavar="NAME",
-            help="Scenes: {presets}. The ogurob presets show one door from many poses, the others many rooms.",
+            help="Scenes: {presets}. The ogurob presets show one door from many poses, site six doors of one building, "
+            "the others many rooms.",
         ),
     ] = "ogurob",
     poses: Annotated[
         int | None, typer.Option(help="Number of robot poses of the ogurob presets. [default: all 1353]")
     ] = None,
     scenes: Annotated[
-        int | None, typer.Option(help="Number of scenes of the other presets. [default: 1000]", min=1)
+        int | None,
+        typer.Option(
+            help="Number of scenes of the other presets, and of views of site. [default: 1000]", min=1
+        ),
     ] = None,
     seed: Annotated[int, typer.Option("--seed", help="Seed of all random numbers.", min=0)] = 0,
     sensor: Annotated[
@@ -81,6 +85,7 @@ def simulate(
       doorstate simulate --out data/small --poses 60 --keep pcd --keep image
       doorstate simulate --preset varied --scenes 10000 --out data/varied
       doorstate simulate --preset varied --scenes 10000 --sensor xtion --out data/varied-xtion
+      doorstate simulate --preset site --scenes 60 --seed 7 --keep depth --out data/site-7
       doorstate simulate --preset cluttered --scenes 40000 --shard 2/8 --out data/cluttered
       doorstate simulate --preset varied --sensor d435 --out data/d435 --prepared data/d435-4096 --thin --max-depth-m 5
     """

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from doorstate._models import FrozenModel
+from doorstate._models import Degrees, FrozenModel
 from doorstate.io.camera import MAX_SIDE_PX, Intrinsics
 from doorstate.io.size_limits import MAX_POINTS
 from doorstate.simulation.scene.box import Pose
@@ -56,6 +56,14 @@ CAMERAS = {
     "xtion-gazebo": DepthCamera(),
     "xtion-hw": DepthCamera(hfov_deg=58.0, min_depth_m=0.8, max_depth_m=3.5),
 }
+
+
+class CameraBias(FrozenModel):
+    """Constant errors of a camera: what it tells of itself less what is true, and the factor of its depths."""
+
+    pitch_deg: Degrees = 0.0
+    roll_deg: Degrees = 0.0
+    depth_factor: float = Field(default=1.0, gt=0.5, lt=2)
 
 
 class CameraPose(NamedTuple):

@@ -25,7 +25,7 @@ class Frame(NamedTuple):
 
     full: Render  # before sensor noise and range
     cut: Render  # as the depth camera reports it
-    points: Points  # (H, W, 3) metres, gravity-aligned sensor frame
+    points: Points  # (H, W, 3) metres, gravity-aligned sensor frame, up to the camera's bias
 
 
 def replay(row: Row) -> Frame:
@@ -42,8 +42,12 @@ def replay_pose(rows: Sequence[Row]) -> list[Frame]:
         seed = sample_seed(row.seed, row.sample_id)
         conditions = row.conditions or INDOORS
         cut = sense(find_sensor(row.sensor), full, boxes, pose, camera, seed, conditions)
+        pitch_rad, roll_rad = pose.pitch_rad, pose.roll_rad
+        if row.bias is not None:
+            cut = cut._replace(depth_m=cut.depth_m * np.float32(row.bias.depth_factor))
+            pitch_rad, roll_rad = map(math.radians, row.told_tilt_deg())
         x_y_z = depth_coordinates(cut.depth_m, intrinsics)
-        frames.append(Frame(full, cut, level(np.moveaxis(x_y_z, 0, -1), pose.pitch_rad, pose.roll_rad)))
+        frames.append(Frame(full, cut, level(np.moveaxis(x_y_z, 0, -1), pitch_rad, roll_rad)))
     return frames
 
 

@@ -15,13 +15,13 @@ from doorstate.errors import DatasetError, first_validation_error
 from doorstate.simulation.row import Row
 
 MANIFEST_FILE = "manifest.csv"
-_OPTIONAL = ("other_doors", "conditions")
+_OPTIONAL = ("bias", "other_doors", "conditions")
 
 
 def flatten(row: Row) -> dict[str, str]:
     """Return columns and their text in the order of the fields; None is an empty text.
 
-    A row without other doors or conditions has no column of them, as in older manifests.
+    A row without a bias, other doors or conditions has no column of them, as in older manifests.
     """
     columns: dict[str, str] = {}
     for name, value in row.model_dump(exclude={name for name in _OPTIONAL if not getattr(row, name)}).items():

@@ -10,6 +10,7 @@ from typing import Literal
 from doorstate._models import FrozenModel
 from doorstate.simulation.camera import DepthCamera
 from doorstate.simulation.draw.building.scene import draw_building, draw_building_no_door
+from doorstate.simulation.draw.building.site import draw_site_view
 from doorstate.simulation.draw.half_ring import half_ring, reduced_ring
 from doorstate.simulation.draw.paper import FIXED_ANGLES_DEG, draw_paper_scene
 from doorstate.simulation.draw.scenes import (
@@ -42,6 +43,7 @@ PresetName = Literal[
     "two-doors",
     "building",
     "building-no-door",
+    "site",
 ]
 DEFAULT_SCENES = 1000
 
@@ -62,18 +64,20 @@ _SCENE_DRAWS: dict[PresetName, Callable[[Stream], DrawnScene]] = {
     "building": draw_building,
     "building-no-door": draw_building_no_door,
 }
+# One building a seed, which all of its poses show.
+_SITE_DRAWS: dict[PresetName, Callable[[int, int], DrawnScene]] = {"site": draw_site_view}
 
 
 class Preset(FrozenModel):
-    """A recipe for samples: either one scene from many poses, or many scenes from one pose each."""
+    """A recipe for samples: one scene from many poses, many scenes from one pose each, or the doors of a building."""
 
     name: PresetName
     camera: DepthCamera = DepthCamera()
 
     @property
     def has_many_scenes(self) -> bool:
-        """True if every pose has a scene of its own."""
-        return self.name in _SCENE_DRAWS
+        """True if poses have scenes of their own, so that there may be any number of them."""
+        return self.name not in _PAPER_DRAWS
 
     def indices(self, count: int | None = None) -> list[int]:
         """Return the numbers of `count` poses; None is all 1353 of the half-ring, or 1000 scenes.
@@ -89,10 +93,12 @@ class Preset(FrozenModel):
         """Draw scene, viewpoint and openings of one pose; they depend on name, seed and index alone."""
         if self.name in _SCENE_DRAWS:
             return _SCENE_DRAWS[self.name](Stream(seed, index, self.name))
-        return _PAPER_DRAWS[self.name](seed, index)
+        return (_PAPER_DRAWS | _SITE_DRAWS)[self.name](seed, index)
 
 
-PRESETS: dict[str, Preset] = {name: Preset(name=name) for name in (*_PAPER_DRAWS, *_SCENE_DRAWS)}
+PRESETS: dict[str, Preset] = {
+    name: Preset(name=name) for name in (*_PAPER_DRAWS, *_SCENE_DRAWS, *_SITE_DRAWS)
+}
 
 
 def draw_rows(preset: Preset, seed: int, index: int) -> list[Row]:
@@ -109,7 +115,7 @@ def draw_rows(preset: Preset, seed: int, index: int) -> list[Row]:
     row = Row(
         sample_id=f"{pose_id}-{NO_DOOR}",
         pose_id=pose_id,
-        scene_id=pose_id if preset.has_many_scenes else "",
+        scene_id=drawn.door_id or (pose_id if preset.has_many_scenes else ""),
         state=NO_DOOR,
         scene_kind=scene.kind,
         x_m=view.x_m,
@@ -123,6 +129,7 @@ def draw_rows(preset: Preset, seed: int, index: int) -> list[Row]:
         robot_angle_deg=view.robot_angle_deg,
         seed=seed,
         camera=preset.camera,
+        bias=drawn.bias,
         scene=scene,
         other_doors=others[0],
         clutter_tries=drawn.clutter_tries,

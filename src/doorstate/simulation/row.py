@@ -11,7 +11,7 @@ from pydantic import Field, field_serializer, field_validator, model_validator
 from doorstate._documents import parse_json
 from doorstate._models import Degrees, FrozenModel, Metres, Seed
 from doorstate.errors import DatasetError
-from doorstate.simulation.camera import CameraPose, DepthCamera
+from doorstate.simulation.camera import CameraBias, CameraPose, DepthCamera
 from doorstate.simulation.noise.conditions import Conditions
 from doorstate.simulation.scene.box import Box
 from doorstate.simulation.scene.door import Opening
@@ -22,11 +22,12 @@ from doorstate.simulation.true_door import OtherDoor
 class Row(FrozenModel):
     """One line of a manifest.
 
-    The scene, opening, camera, pose, sensor, seed and name rebuild the frame; the other columns describe it. Poses are
-    in the door frame, except `door_*`, which is the door frame in the sensor frame. Columns that do not apply are
+    The scene, opening, camera, pose, sensor, seed and name rebuild the frame; the other columns describe it. Poses
+    are in the door frame, except `door_*`, which is the door frame in the sensor frame. Columns that do not apply are
     empty: those of the door in scenes without one, angles of a door that opens by a share, and `scene_id` where all
-    samples of a data set show the same scene. All columns of a door describe the main door; `other_doors` holds those
-    beside it. The state of folding and revolving doors is `unknown`.
+    samples of a data set show the same scene. Where several poses show one door, `scene_id` names the door. All
+    columns of a door describe the main door; `other_doors` holds those beside it. The state of folding and revolving
+    doors is `unknown`.
     """
 
     sample_id: str
@@ -61,6 +62,7 @@ class Row(FrozenModel):
     sensor: str = "none"  # a name for noise.sensors.find_sensor
     conditions: Conditions | None = None  # of sensors that depend on them
     camera: DepthCamera
+    bias: CameraBias | None = None  # poses and angles are the true ones
     scene: Scene
     other_doors: tuple[OtherDoor, ...] = Field(default=(), max_length=20)
     clutter_tries: int = 0
@@ -99,6 +101,11 @@ class Row(FrozenModel):
         """Return the camera in the door frame."""
         position_m = self.x_m, self.y_m, self.camera_height_m
         return CameraPose.from_degrees(position_m, self.heading_deg, self.pitch_deg, self.roll_deg)
+
+    def told_tilt_deg(self) -> tuple[float, float]:
+        """Return pitch and roll as the camera tells them."""
+        bias = self.bias or CameraBias()
+        return self.pitch_deg + bias.pitch_deg, self.roll_deg + bias.roll_deg
 
     def opening(self) -> Opening:
         """Return the angles or the share the door is open by."""

@@ -184,7 +184,7 @@ def _simulate_piece(piece: _Piece, path: Path) -> None:
 
 def _index_row(row: Row) -> dict[str, str]:
     """Return the line of a depth image in the index, from which its cloud can be read as it was rendered."""
-    camera = row.camera.intrinsics()
+    camera, (pitch_deg, roll_deg) = row.camera.intrinsics(), row.told_tilt_deg()
     values = {
         "file": f"{row.state}/{row.sample_id}.png",
         "state": row.state,
@@ -192,8 +192,9 @@ def _index_row(row: Row) -> dict[str, str]:
         "height": camera.height,
         **{name: getattr(camera, name) for name in ("fx", "fy", "cx", "cy")},
         "depth_unit_m": 0.001,
-        "roll_deg": row.roll_deg,
-        "pitch_deg": row.pitch_deg,
+        "roll_deg": roll_deg,
+        "pitch_deg": pitch_deg,
+        **({"door": row.scene_id} if row.scene_id != row.pose_id else {}),
     }
     return {name: str(value) for name, value in values.items()}
 

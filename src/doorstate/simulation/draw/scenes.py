@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from doorstate.errors import ConfigError
-from doorstate.simulation.camera import DepthCamera
+from doorstate.simulation.camera import CameraBias, DepthCamera
 from doorstate.simulation.draw.clutter import draw_items
 from doorstate.simulation.draw.doors import draw_door
 from doorstate.simulation.draw.features import draw_feature
@@ -40,6 +40,8 @@ class DrawnScene(NamedTuple):
     openings: list[Opening]
     clutter_tries: int = 0
     other_openings: Sequence[tuple[Opening, ...]] = ()  # of the other doors, one entry for each of `openings`
+    door_id: str = ""  # of a main door that other scenes show, too
+    bias: CameraBias | None = None
 
 
 def draw_varied(stream: Stream) -> DrawnScene:

@@ -67,6 +67,11 @@ def draw_building_door(
     return Door(**common | own)
 
 
+def draw_door_like(stream: Stream, style: Door) -> Door:
+    """Draw a door of a style: it may be hinged on the other side, and swing the other way."""
+    return style.model_copy(update={"hinge": stream.choice(_HINGES), "swing": stream.choice(_SWINGS)})
+
+
 def draw_lift_door(stream: Stream, wall_m: tuple[float, float] | None = None) -> Door:
     """Draw the landing door of a lift: two leaves of metal that part in the wall, just behind its face."""
     wall, height = wall_m or (stream.uniform(*WALL_THICKNESS_M), stream.uniform(*WALL_HEIGHT_M))

@@ -6,13 +6,18 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from doorstate.simulation.draw.building.apertures import draw_passage, draw_windows
-from doorstate.simulation.draw.building.doors import draw_building_door, draw_lift_door
+from doorstate.simulation.draw.building.doors import (
+    draw_building_door,
+    draw_door_like,
+    draw_lift_door,
+)
 from doorstate.simulation.draw.building.plan import Plan, WallAperture
 from doorstate.simulation.draw.building.stairs import draw_stairs
 from doorstate.simulation.draw.doors import WALL_HEIGHT_M
 from doorstate.simulation.draw.layouts import Layout, WallDoor
 from doorstate.simulation.draw.stream import Stream
 from doorstate.simulation.scene.box import Box
+from doorstate.simulation.scene.door import Door
 from doorstate.simulation.scene.plan import collide
 from doorstate.simulation.scene.room import Space
 from doorstate.simulation.scene.scene import LayoutKind
@@ -25,7 +30,7 @@ LAYOUTS: dict[LayoutKind, float] = {
     "lobby": 0.12,
     "stairwell": 0.12,
 }
-_INNER_WALL_M, _OUTER_WALL_M = (0.08, 0.25), (0.24, 0.45)
+INNER_WALL_M, _OUTER_WALL_M = (0.08, 0.25), (0.24, 0.45)
 _STAIRWELL_HEIGHT_M = (4.6, 5.6)
 _PLACE_TRIES = 12
 _LANDING_M = 1.1
@@ -45,20 +50,29 @@ _SIZES: dict[LayoutKind, _Size] = {
 }
 
 
-def draw_plan(stream: Stream, kind: LayoutKind, has_doors: bool) -> Plan:
-    """Draw a room with doors and apertures; far spaces of doors are drawn by `draw_spaces_behind`."""
+def draw_plan(stream: Stream, kind: LayoutKind, has_doors: bool, style: Door | None = None) -> Plan:
+    """Draw a room with doors and apertures; far spaces of doors are drawn by `draw_spaces_behind`.
+
+    Args:
+        stream: random numbers.
+        kind: kind of room.
+        has_doors: draw doors.
+        style: all doors but those of lifts are like this one, and the inner walls like its wall; drawn if not given.
+    """
     length, width = (stream.uniform(*ends) for ends in _SIZES[kind])
     thicknesses = (
-        stream.uniform(*_INNER_WALL_M),
-        stream.uniform(*_INNER_WALL_M),
-        stream.uniform(*_INNER_WALL_M),
-        stream.uniform(*_INNER_WALL_M),
+        stream.uniform(*INNER_WALL_M),
+        stream.uniform(*INNER_WALL_M),
+        stream.uniform(*INNER_WALL_M),
+        stream.uniform(*INNER_WALL_M),
     )
     ends = (
         (True, True) if kind in ("room", "lobby", "stairwell") else (stream.chance(0.75), stream.chance(0.6))
     )
     layout = Layout(length, width, (True, ends[0], True, ends[1]))
     height = stream.uniform(*(_STAIRWELL_HEIGHT_M if kind == "stairwell" else WALL_HEIGHT_M))
+    if style is not None:
+        thicknesses, height = (style.wall_thickness_m,) * 4, style.wall_height_m
     plan = Plan(kind, layout, thicknesses, height)
     if kind in ("room", "corridor", "lobby") and stream.chance(0.5):
         plan = _with_windows(stream, plan)
@@ -70,7 +84,7 @@ def draw_plan(stream: Stream, kind: LayoutKind, has_doors: bool) -> Plan:
         plan = _with_passage(stream, plan, stream.integer(0, 3), full_height=False)
     if kind == "stairwell":
         plan = draw_stairs(stream, plan)
-    return _with_doors(stream, plan) if has_doors else plan
+    return _with_doors(stream, plan, style) if has_doors else plan
 
 
 def _with_windows(stream: Stream, plan: Plan) -> Plan:
@@ -91,7 +105,7 @@ def _with_passage(stream: Stream, plan: Plan, wall: int, full_height: bool) -> P
     return plan._replace(apertures=(*plan.apertures, passage)) if passage else plan
 
 
-def _with_doors(stream: Stream, plan: Plan) -> Plan:
+def _with_doors(stream: Stream, plan: Plan, style: Door | None) -> Plan:
     """Return the plan with doors in walls that fit the kind of room."""
     match plan.kind:
         case "corridor" | "junction":
@@ -107,17 +121,20 @@ def _with_doors(stream: Stream, plan: Plan) -> Plan:
         case _:
             walls = [stream.choice({0: 0.5, 1: 0.25, 3: 0.25}) for _ in range(stream.integer(1, 3))]
     for wall in walls:
-        plan = _with_door(stream, plan, wall)
+        plan = _with_door(stream, plan, wall, style)
     return plan
 
 
-def _with_door(stream: Stream, plan: Plan, wall: int) -> Plan:
+def _with_door(stream: Stream, plan: Plan, wall: int, style: Door | None) -> Plan:
     """Return the plan with one more door in a wall, if there is a place for it."""
     if not plan.layout.has_wall[wall] or any(
         one.wall == wall and one.aperture.kind == "window" for one in plan.apertures
     ):
         return plan
-    door = draw_building_door(stream, (plan.thicknesses_m[wall], plan.height_m))
+    if style is None:
+        door = draw_building_door(stream, (plan.thicknesses_m[wall], plan.height_m))
+    else:
+        door = draw_door_like(stream, style)
     stairs = [flight.outline() for flight in plan.stairs]
     for _ in range(_PLACE_TRIES):
         candidate = WallDoor(wall, stream.uniform(0.0, plan.layout.wall_length_m(wall)), door)

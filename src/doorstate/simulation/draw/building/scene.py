@@ -30,7 +30,7 @@ from doorstate.simulation.scene.scene import BoxGroups
 from doorstate.types import Part
 
 _TRIES, _CAMERA_TRIES = 200, 5
-_AROUND_CAMERA_M = -0.05  # a tolerance below zero is a distance
+AROUND_CAMERA_M = -0.05  # a tolerance below zero is a distance
 RANGE_M = (0.4, 5.0)
 LEAST_MEASURED = 0.4  # of the rays, within the range
 LEAST_DOOR, USUAL_DOOR = 0.012, 0.05  # shares of the rays that a door in view needs
@@ -80,25 +80,22 @@ def _draw_with_doors(stream: Stream, plan: Plan) -> DrawnScene | None:
     openings = draw_door_openings(stream, plan, groups)
     if openings is None:
         return None
-    walls = [*solid(groups.room), *(box for boxes in closed_door_boxes(groups) for box in boxes)]
-    taken = Footprints.of(
-        [*walls, *swept_boxes(plan, openings), *(flight.outline() for flight in plan.stairs)]
-    )
+    taken = occupied(plan, groups, openings)
     target = stream.integer(0, len(plan.layout.doors) - 1)
     least = USUAL_DOOR if stream.chance(_USUAL_CHANCE) else LEAST_DOOR
     for _ in range(_CAMERA_TRIES):
         frame = plan.layout.door_frame(target)
         camera = draw_camera(stream, plan, frame)
-        if camera is None or collide([body_box(camera)], taken, _AROUND_CAMERA_M):
+        if camera is None or collide([body_box(camera)], taken, AROUND_CAMERA_M):
             continue
         # A first look at the bare room saves furnishing it in vain.
-        if _main_door(plan, look(groups.all(), camera, COARSE), groups, camera, least) is None:
+        if main_door(plan, look(groups.all(), camera, COARSE), groups, camera, least) is None:
             continue
         furnished = _furnish(stream, plan, camera, (frame.x_m, frame.y_m), taken)
         groups_then = furnished.box_groups(0)
-        main = _main_door(furnished, look(groups_then.all(), camera), groups_then, camera, least)
+        main = main_door(furnished, look(groups_then.all(), camera), groups_then, camera, least)
         if main is not None:
-            return _drawn(stream, furnished, camera, main, openings)
+            return drawn_scene(stream, furnished, camera, main, openings)
     return None
 
 
@@ -106,15 +103,27 @@ def _furnish(
     stream: Stream, plan: Plan, camera: PlacedCamera, target_m: tuple[float, float], obstacles: Footprints
 ) -> Plan:
     """Return the plan with fixtures, furniture and people that keep clear of obstacles and the camera."""
-    taken = obstacles.joined(Footprints.of([body_box(camera)]))
-    fixtures = (*plan.fixtures, *draw_wall_fixtures(stream, plan, taken))
-    taken = taken.joined(Footprints.of([box for fixture in fixtures for box in fixture_boxes(fixture)]))
-    plan = plan._replace(fixtures=fixtures, items=draw_furniture(stream, plan, taken))
-    taken = taken.joined(Footprints.of([box for item in plan.items for box in item_boxes(item)]))
+    plan, taken = furnish(stream, plan, obstacles.joined(Footprints.of([body_box(camera)])))
     return plan._replace(people=draw_people(stream, plan, camera, target_m, taken))
 
 
-def _main_door(
+def furnish(stream: Stream, plan: Plan, taken: Footprints) -> tuple[Plan, Footprints]:
+    """Return the plan with fixtures and furniture that keep clear of what is taken, and what is taken then."""
+    fixtures = (*plan.fixtures, *draw_wall_fixtures(stream, plan, taken))
+    taken = taken.joined(Footprints.of([box for fixture in fixtures for box in fixture_boxes(fixture)]))
+    plan = plan._replace(fixtures=fixtures, items=draw_furniture(stream, plan, taken))
+    return plan, taken.joined(Footprints.of([box for item in plan.items for box in item_boxes(item)]))
+
+
+def occupied(plan: Plan, groups: BoxGroups, openings: Sequence[Sequence[Opening]]) -> Footprints:
+    """Return what furniture, people and cameras keep clear of: walls, doors, the sweep of their leaves, and stairs."""
+    walls = [*solid(groups.room), *(box for boxes in closed_door_boxes(groups) for box in boxes)]
+    return Footprints.of(
+        [*walls, *swept_boxes(plan, openings), *(flight.outline() for flight in plan.stairs)]
+    )
+
+
+def main_door(
     plan: Plan, view: View, groups: BoxGroups, camera: PlacedCamera, least_share: float
 ) -> int | None:
     """Return the number of the door most in front of those in view; None if none is, or the view is too empty."""
@@ -137,7 +146,7 @@ def _main_door(
     return min(remoteness, key=remoteness.__getitem__) if remoteness else None
 
 
-def _drawn(
+def drawn_scene(
     stream: Stream, plan: Plan, camera: PlacedCamera, main: int, openings: Sequence[Sequence[Opening]]
 ) -> DrawnScene:
     """Return the scene in the frame of its main door, whose openings come in the order of their states."""
@@ -177,7 +186,7 @@ def _draw_without_door(
     obstacles = Footprints.of([*solid(groups.room), *groups.main, *outlines])
     for _ in range(_CAMERA_TRIES):
         camera = draw_camera(stream, plan, frame)
-        if camera is None or collide([body_box(camera)], obstacles, _AROUND_CAMERA_M):
+        if camera is None or collide([body_box(camera)], obstacles, AROUND_CAMERA_M):
             continue
         if shows_rectangle(camera, frame, width_m, heights_m) < LEAST_SHOWN:
             continue
