@@ -101,6 +101,7 @@ CALLS = {
     "create_network('pointnet')": "train",
     "create_network('pointnet2', pretrained=True)": "train",
     "import_module('doorstate.training.comparison')": "train",
+    "import_module('doorstate.viewer.label_page')": None,
     "import_module('doorstate.evaluation.metrics')": "train",
     "import_module('doorstate.inference.export')": "onnx",
     "import_module('doorstate.serving.app')": "serve",

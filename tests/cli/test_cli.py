@@ -22,6 +22,7 @@ COMMANDS = (
     "resolution",
     "transfer",
     "predict",
+    "label",
     "evaluate",
     "view",
     "serve",

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from doorstate.dataset.frame_index import IndexedOptions, read_index
+from doorstate.doorways.doorway import Doorway
 from doorstate.errors import CameraError, DatasetError
 from doorstate.io.camera import Intrinsics, Pinhole
 from doorstate.io.options import ReadOptions
@@ -89,3 +90,17 @@ def test_colour_images_outside_are_refused(tmp_path: Path) -> None:
     with pytest.raises(DatasetError) as caught:
         read_index(folder, ReadOptions())
     assert caught.value.field == "rgb"
+
+
+def test_lines_with_places_share_a_file_and_those_without_a_state_are_left_out(tmp_path: Path) -> None:
+    header = "file,state,door_x_m,door_y_m,door_yaw_deg,door_width_m,door_floor_z_m\n"
+    folder = write(
+        tmp_path, header + "a.pcd,open,2,0.5,90,0.9,-1\na.pcd,closed,2,-1,90,0.8,-1\nb.pcd,,,,,,\n"
+    )
+    (folder / "a.pcd").touch()
+    lines = read_index(folder, ReadOptions())
+    assert [line.doorway for line in lines] == [Doorway(2, 0.5, 90, 0.9, -1), Doorway(2, -1, 90, 0.8, -1)]
+    write(tmp_path, header + "a.pcd,open,2,0.5,90,0.9,-1\na.pcd,closed,,,,,\n")
+    with pytest.raises(DatasetError) as raised:
+        read_index(folder, ReadOptions())
+    assert raised.value.field == "file"

@@ -18,6 +18,7 @@ from doorstate.cli.export import export
 from doorstate.cli.export_sdf import export_sdf
 from doorstate.cli.info import info
 from doorstate.cli.join import join
+from doorstate.cli.label import label
 from doorstate.cli.predict import predict
 from doorstate.cli.prepare import prepare
 from doorstate.cli.report import report
@@ -38,6 +39,7 @@ _COMMANDS = (
     resolution,
     transfer,
     predict,
+    label,
     evaluate,
     view,
     serve,

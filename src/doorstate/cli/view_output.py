@@ -67,7 +67,7 @@ def show_page(
                 f"the page has {len(page) / 1e6:.0f} MB and opens slowly: use --every or fewer --points",
             )
         if out is None and open_browser:
-            _open_in_browser(path.absolute().as_uri())
+            open_in_browser(path.absolute().as_uri())
     if errors:
         stderr.print(f"{len(errors)} of {len(entries)} clouds could not be shown")
         raise typer.Exit(1)
@@ -92,7 +92,7 @@ def show_live(
         print(page.address, flush=True)  # noqa: T201
         stderr.print("press Ctrl-C to stop")
         if open_browser:
-            _open_in_browser(page.address)
+            open_in_browser(page.address)
         try:
             for cloud in clouds:
                 page.publish("cloud", make_entry(predictor, cloud, format_flag, shown))
@@ -105,6 +105,7 @@ def show_live(
             stderr.print("stopped")
 
 
-def _open_in_browser(address: str) -> None:
+def open_in_browser(address: str) -> None:
+    """Open an address in the browser, or say that there is none."""
     if not webbrowser.open(address):
         stderr.print(f"no browser found; open {address}")

@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`index.csv` of frames: one line a file, with its camera where known, and its label.
+"""`index.csv` of frames: one line a file, or one a door of it, with its camera where known, and its label.
 
 Column `file` is required, for labelled frames `state` too. `fx`, `fy`, `cx`, `cy`, `width`, `height` (pixels),
 `depth_unit_m`, `axes`, `roll_deg`, `pitch_deg`, `quaternion` and `camera_height_m` override the read options of that
-file; an empty text or `?` is unknown. Further columns are kept. Files are inside the folder of the index.
+file; an empty text or `?` is unknown. `door_x_m`, `door_y_m`, `door_yaw_deg`, `door_width_m` and `door_floor_z_m` are
+the place of the door of a line in the level sensor frame (`Doorway`); with a place in each, a file may have several
+lines. `door` and `moment` name the door and the still view, by which frames depend on each other. Further columns are
+kept. Files are inside the folder of the index.
 """
 
 from __future__ import annotations
@@ -13,11 +16,12 @@ import os
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from doorstate._files import read_csv
 from doorstate._paths import resolve_inside
 from doorstate.dataset.class_folders import label_of_folder
+from doorstate.doorways.doorway import Doorway
 from doorstate.errors import CameraError, DatasetError, DoorstateError
 from doorstate.io.camera import Intrinsics, Pinhole
 from doorstate.io.find import INDEX_FILE
@@ -31,12 +35,23 @@ _NUMBERS = {
     "camera_height_m": "camera_height_m",
 }
 _CAMERA = ("fx", "fy", "cx", "cy")
+PLACE_COLUMNS = {f"door_{name}": name for name in ("x_m", "y_m", "yaw_deg", "width_m", "floor_z_m")}
+"""Fields of a `Doorway` by column."""
+DOOR_COLUMN, MOMENT_COLUMN = "door", "moment"
 _UNKNOWN = ("", "?")
 _LEVELS = 3  # folders above a file that may hold its index, as in Depth/Test/Closed
 
 
-def read_index(folder: Path, options: ReadOptions) -> list[tuple[dict[str, str], ReadOptions]]:
-    """Return the lines of labelled frames, and the read options of each file.
+class IndexLine(NamedTuple):
+    """Line of a labelled frame."""
+
+    row: dict[str, str]
+    options: ReadOptions
+    doorway: Doorway | None  # place of the door that is labelled
+
+
+def read_index(folder: Path, options: ReadOptions) -> list[IndexLine]:
+    """Return the lines of labelled frames; those without a state are left out.
 
     Raises:
         DatasetError: a line is invalid, or names a file that does not exist or is outside of the folder.
@@ -50,11 +65,15 @@ def read_index(folder: Path, options: ReadOptions) -> list[tuple[dict[str, str],
     for number, row in enumerate(rows, start=2):
         state = row["state"].strip()
         if not state:
-            raise _invalid(index, number, "has no value", "state")
+            continue
         if not (folder / row["file"]).is_file():
             raise _invalid(index, number, f"no file {row['file']!r} in the folder", "file")
         line = row | {"state": label_of_folder(state) or state}
-        entries.append((line, _options(row, options, index, number)))
+        entries.append(
+            IndexLine(line, _options(row, options, index, number), doorway_of_line(row, index, number))
+        )
+    if not entries:
+        raise DatasetError("has no line with a state", path=index, field="state")
     return entries
 
 
@@ -100,14 +119,35 @@ class IndexedOptions:
             return error
 
 
+def doorway_of_line(row: Mapping[str, str], index: Path, number: int) -> Doorway | None:
+    """Return the place of the door of a line, or None without one.
+
+    Raises:
+        DatasetError: a number of it is missing or impossible.
+    """
+    values = {field: _number(row, column, index, number) for column, field in PLACE_COLUMNS.items()}
+    missing = [column for column, field in PLACE_COLUMNS.items() if values[field] is None]
+    if len(missing) == len(values):
+        return None
+    if missing:
+        raise _invalid(index, number, f"places a door without {missing[0]}", missing[0])
+    doorway = Doorway(**{field: value or 0.0 for field, value in values.items()})
+    if doorway.width_m <= 0:
+        raise _invalid(index, number, f"has a door of {doorway.width_m:g} m", "door_width_m")
+    return doorway
+
+
 def _normalized(path: Path) -> Path:
     return Path(os.path.normpath(path.absolute()))
 
 
 def _read_rows(index: Path, columns: tuple[str, ...]) -> list[dict[str, str]]:
-    """Return the lines of an index with these columns, each with a file of its own inside the folder."""
+    """Return the lines of an index with these columns, each with a file of its own inside the folder.
+
+    Lines that place a door may share a file.
+    """
     rows = read_csv(index)
-    names: set[str] = set()
+    places: dict[str, bool] = {}  # of the lines of a file
     for number, row in enumerate(rows, start=2):
         for column in columns:
             if column not in row:
@@ -115,9 +155,10 @@ def _read_rows(index: Path, columns: tuple[str, ...]) -> list[dict[str, str]]:
         name = row["file"]
         if not name:
             raise _invalid(index, number, "has no value", "file")
-        if name in names:
+        has_place = bool(row.get("door_x_m", "").strip())
+        if name in places and not (has_place and places[name]):
             raise _invalid(index, number, f"repeats {name!r}", "file")
-        names.add(name)
+        places[name] = has_place
         for column in ("file", "rgb"):
             try:
                 resolve_inside(index.parent, row.get(column, ""))

@@ -3,14 +3,16 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
 from doorstate.dataset.class_folders import file_row, label_of_folder, nearest_label
 from doorstate.dataset.frame_index import read_index
 from doorstate.dataset.layouts import find_layout
+from doorstate.doorways.doorway import Doorway
 from doorstate.errors import DatasetError, unknown_name
 from doorstate.io.find import INDEX_FILE, find_clouds
 from doorstate.io.options import DEFAULT_OPTIONS, ReadOptions
@@ -20,13 +22,20 @@ from doorstate.types import Points
 
 @dataclass(frozen=True)
 class LabelledFrame:
-    """A recorded cloud, its label and its further columns."""
+    """A recorded cloud, or one door in it, with its label and its further columns."""
 
     file: str  # below the folder
     label: str  # a state, `no_door`, or any other text of the index
     columns: Mapping[str, str]  # further columns as written
     folder: Path
     read: Callable[[], Points]
+    doorway: Doorway | None = None  # place of the door that is labelled
+    number: int = 1  # among the lines of the file
+
+    @property
+    def name(self) -> str:
+        """The file, with a number from its second line on."""
+        return self.file if self.number == 1 else f"{self.file}#{self.number}"
 
 
 def labelled_frames(
@@ -54,10 +63,7 @@ def labelled_frames(
     if not folder.is_dir():
         raise DatasetError("is not a folder", path=folder)
     if (folder / INDEX_FILE).is_file():
-        return [
-            _frame(folder, row, partial(read_cloud, folder / row["file"], row_options))
-            for row, row_options in read_index(folder, options)
-        ]
+        return _indexed_frames(folder, options)
     labels = {path: nearest_label(folder, path, label_of_folder) for path in find_clouds([folder])}
     rows = [file_row(folder, path, label) for path, label in labels.items() if label is not None]
     if not rows:
@@ -67,6 +73,16 @@ def labelled_frames(
             expected="folders such as closed, semi-open, open, no-door",
         )
     return [_frame(folder, row, partial(read_cloud, folder / row["file"], options)) for row in rows]
+
+
+def _indexed_frames(folder: Path, options: ReadOptions) -> list[LabelledFrame]:
+    lines: Counter[str] = Counter()
+    frames = []
+    for row, row_options, doorway in read_index(folder, options):
+        lines[row["file"]] += 1
+        frame = _frame(folder, row, partial(read_cloud, folder / row["file"], row_options))
+        frames.append(replace(frame, doorway=doorway, number=lines[row["file"]]))
+    return frames
 
 
 def check_column(frames: Sequence[LabelledFrame], column: str) -> None:

@@ -14,6 +14,7 @@ from doorstate._jobs import Progress, no_progress
 from doorstate.dataset.labelled import LabelledFrame, check_column
 from doorstate.errors import DoorstateError
 from doorstate.evaluation.frame_scores import FrameScores, score_frames
+from doorstate.evaluation.labelled_doors import prediction_at
 from doorstate.evaluation.manifest import text_values
 from doorstate.evaluation.results import TEXT_COLUMNS, join_manifest
 from doorstate.inference.abstention import Abstention
@@ -39,7 +40,7 @@ class FrameResults:
         rows = [
             {
                 "method": method,
-                "sample_id": frame.file,
+                "sample_id": frame.name,
                 "state": frame.label,
                 "predicted": prediction.label,
                 **{
@@ -63,7 +64,7 @@ class FrameResults:
         On a frame without a clear door an abstention is `correct`; on one of unknown state every answer is.
         """
         index = pd.DataFrame(
-            [{**frame.columns, "sample_id": frame.file, "state": ""} for frame in self.frames]
+            [{**frame.columns, "sample_id": frame.name, "state": ""} for frame in self.frames]
         )
         joined = join_manifest(self.predictions, index.astype("str").set_index("sample_id", drop=False))
         is_door = joined["state"].isin(STATES)
@@ -72,7 +73,7 @@ class FrameResults:
 
     def misclassified_by(self, number: int) -> list[str]:
         """Return the methods that misclassified a frame, or predicted a state where there is no clear door."""
-        rows = self.joined[self.joined["sample_id"] == self.frames[number].file]
+        rows = self.joined[self.joined["sample_id"] == self.frames[number].name]
         return rows.loc[~rows["correct"], "method"].tolist()
 
     def score(self, group: str | None = None, by: Sequence[str] = ()) -> FrameScores:
@@ -105,32 +106,48 @@ class FrameResults:
 def evaluate_frames(
     predictors: Predictors, frames: Sequence[LabelledFrame], progress: Progress = no_progress
 ) -> FrameResults:
-    """Read every frame once and predict its state with every method.
+    """Read every file once and predict its state with every method, at the place of each labelled door.
 
     A method abstains from a frame that it cannot use, with the error as its reason.
     """
     readable: list[LabelledFrame] = []
     unreadable: list[tuple[LabelledFrame, str]] = []
     outputs: dict[str, list[Prediction]] = {name: [] for name in predictors}
+    of_file: tuple[str, dict[str, Prediction] | str] = (
+        "",
+        "",
+    )  # predictions of the last file, or why there are none
     for number, frame in enumerate(frames):
-        try:
-            cloud = frame.read()
-        except DoorstateError as error:
-            unreadable.append((frame, error.describe(with_path=False)))
+        if frame.file != of_file[0]:
+            of_file = frame.file, _predict(predictors, frame)
+        predictions = of_file[1]
+        if isinstance(predictions, str):
+            unreadable.append((frame, predictions))
         else:
             readable.append(frame)
-            for name, predictor in predictors.items():
-                try:
-                    prediction = predictor(cloud)
-                except DoorstateError as error:
-                    prediction = Prediction.abstain(Abstention.from_error(error))
-                outputs[name].append(prediction)
+            for name, prediction in predictions.items():
+                outputs[name].append(prediction_at(prediction, frame.doorway))
         progress(number + 1, len(frames))
     return FrameResults(
         tuple(readable),
         {name: tuple(predictions) for name, predictions in outputs.items()},
         tuple(unreadable),
     )
+
+
+def _predict(predictors: Predictors, frame: LabelledFrame) -> dict[str, Prediction] | str:
+    """Return the prediction of each method for a file, or the reason why it cannot be read."""
+    try:
+        cloud = frame.read()
+    except DoorstateError as error:
+        return error.describe(with_path=False)
+    predictions = {}
+    for name, predictor in predictors.items():
+        try:
+            predictions[name] = predictor(cloud)
+        except DoorstateError as error:
+            predictions[name] = Prediction.abstain(Abstention.from_error(error))
+    return predictions
 
 
 def _number(value: float | None) -> float:

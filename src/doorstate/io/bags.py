@@ -151,6 +151,7 @@ class Bag:
         options: ReadOptions = DEFAULT_OPTIONS,
         camera_info_topic: str | None = None,
         every: int = 1,
+        start: int = 0,
     ) -> Iterator[StampedCloud]:
         """Read the clouds of a topic in the order of recording.
 
@@ -160,13 +161,14 @@ class Bag:
             camera_info_topic: topic with the camera of depth images; None takes the camera of the options, or the
                 topic `camera_info` beside the images.
             every: read one of this number of messages.
+            start: number of the first message to read.
 
         Raises:
             CameraError: depth images without a camera.
             CloudReadError: the bag is damaged from here on. A single damaged message is yielded with its error.
         """
         convert = self._converter(topic, options, camera_info_topic)
-        for log_ns, raw in islice(self._raw_messages(topic.name), 0, None, every):
+        for log_ns, raw in islice(self._raw_messages(topic.name), start, None, every):
             yield self._stamped(log_ns, raw, topic, convert)
 
     def _problem(self, name: str) -> str:

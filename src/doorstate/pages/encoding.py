@@ -47,10 +47,10 @@ def closed(detection: Detection) -> NDArray[np.float64]:
     return np.concatenate([points, points[:1]]) if len(points) > 2 else points
 
 
-def picture_uri(picture: NDArray[np.uint8]) -> str:
-    """Return (H, W, 3) pixels as a small JPEG in a data URI."""
+def picture_uri(picture: NDArray[np.uint8], size_px: tuple[int, int] = _PICTURE_PX) -> str:
+    """Return (H, W, 3) pixels as a JPEG of at most a size (width, height) in a data URI."""
     image = Image.fromarray(picture)
-    image.thumbnail(_PICTURE_PX)
+    image.thumbnail(size_px)
     encoded = io.BytesIO()
     image.save(encoded, format="JPEG", quality=85)
     return data_uri(encoded.getvalue(), "image/jpeg")

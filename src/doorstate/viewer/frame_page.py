@@ -13,6 +13,9 @@ from doorstate.dataset.labelled import LabelledFrame
 from doorstate.evaluation.errors import missed_by
 from doorstate.evaluation.frames import FrameResults, Predictors
 from doorstate.evaluation.table import Table
+from doorstate.inference.prediction import Prediction
+from doorstate.inference.predictor import Predictor
+from doorstate.inference.serialization import prediction_to_dict
 from doorstate.pages.colors import DETECTION_COLORS, STATE_COLORS
 from doorstate.pages.render import render_page
 from doorstate.types import STATES
@@ -89,19 +92,30 @@ def make_cards(
     for done, number in enumerate(numbers, 1):
         frame = results.frames[number]
         cloud = frame.read()
-        named = NamedCloud(frame.file, cloud, truth=frame.label if frame.label in STATES else "")
+        named = NamedCloud(frame.name, cloud, truth=frame.label if frame.label in STATES else "")
         cards.append(
             FrameCard(
-                file=frame.file,
+                file=frame.name,
                 label=frame.label,
                 facts=_facts(frame),
                 pictures=frame_pictures(frame, cloud),
-                entries={name: make_entry(predictor, named) for name, predictor in predictors.items()},
+                entries={
+                    name: _entry(predictor, named, frame, results.outputs[name][number])
+                    for name, predictor in predictors.items()
+                },
                 misclassified_by=tuple(results.misclassified_by(number)),
             )
         )
         progress(done, len(numbers))
     return cards
+
+
+def _entry(predictor: Predictor, named: NamedCloud, frame: LabelledFrame, prediction: Prediction) -> Entry:
+    """Return the entry of a frame; of a labelled door, with the prediction for its place."""
+    entry = make_entry(predictor, named)
+    if frame.doorway is None or "error" in entry:
+        return entry
+    return entry | {"prediction": prediction_to_dict(prediction)}
 
 
 def render_frame_page(

@@ -10,18 +10,17 @@ from collections import deque
 from collections.abc import Iterator
 from contextlib import suppress
 from http import HTTPStatus
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from http.server import BaseHTTPRequestHandler
 from types import TracebackType
 from typing import Any, Literal
 
-from doorstate.errors import ConfigError
+from doorstate.viewer.local_server import LocalServer, is_local
 
 _KEPT_EVENTS = 100  # for browsers that connect late or are slow
 _KEEP_ALIVE_S = 5.0  # a comment after this time without an event reveals a closed connection
-_LOCAL_NAMES = {"127.0.0.1", "localhost"}
 
 
-class LivePage:
+class LivePage(LocalServer):
     """Server of one page to any number of browsers on this machine, as a context manager.
 
     Args:
@@ -38,17 +37,7 @@ class LivePage:
         self._number = time.time_ns() // 10**6
         self._changed = threading.Condition()
         self._open = True
-        try:
-            self._server = ThreadingHTTPServer(("127.0.0.1", port), _handler_class(self, page.encode()))
-        except OSError as error:
-            raise ConfigError(
-                f"cannot listen on port {port}: {error.strerror or error}", field="port"
-            ) from error
-        self.address = f"http://127.0.0.1:{self._server.server_address[1]}/"
-
-    def __enter__(self) -> LivePage:
-        threading.Thread(target=self._server.serve_forever, args=(0.1,), daemon=True).start()
-        return self
+        super().__init__(_handler_class(self, page.encode()), port)
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -56,8 +45,7 @@ class LivePage:
         with self._changed:
             self._open = False
             self._changed.notify_all()
-        self._server.shutdown()
-        self._server.server_close()
+        super().__exit__(kind, error, trace)
 
     def publish(self, kind: Literal["cloud", "end"], content: object) -> None:
         """Send an event to all browsers.
@@ -95,8 +83,7 @@ def _handler_class(live: LivePage, page: bytes) -> type[BaseHTTPRequestHandler]:
                 self._respond()
 
         def _respond(self) -> None:
-            # DNS rebinding: a foreign page whose name resolves to this address must not read the clouds.
-            if self.headers.get("Host", "").split(":")[0] not in _LOCAL_NAMES:
+            if not is_local(self.headers):
                 self.send_error(HTTPStatus.FORBIDDEN, "Host must be 127.0.0.1 or localhost")
             elif self.path == "/":
                 self._send_head("text/html; charset=utf-8")
