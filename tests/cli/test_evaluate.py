@@ -129,6 +129,18 @@ def test_page_draws_clouds_and_filters_frames(report: Report) -> None:
         assert errors == []
 
 
+def test_page_shows_the_frames_that_changed(recordings: Path, run: Run, tmp_path: Path) -> None:
+    rules = ("--rule", "open_door", "--rule", "plane_state")
+    code, _, _ = run("evaluate", recordings, *rules, "--changed", "--out", tmp_path)
+    assert code == 1  # one file could not be read
+    (change,) = json.loads((tmp_path / "metrics.json").read_text(encoding="utf-8"))["changes"]
+    assert (change["before"], change["after"], change["frames"]) == ("open_door", "plane_state", 6)
+    assert change["corrected"] > 0
+    page = (tmp_path / "frames.html").read_text(encoding="utf-8")
+    assert f"<h3>{change['corrected']} corrected</h3>" in page
+    assert (tmp_path / "tables" / "changes.csv").is_file()
+
+
 def test_state_folders_give_the_same_files_twice(recordings: Path, run: Run, tmp_path: Path) -> None:
     for state in ("closed", "semi_open", "open"):
         (tmp_path / state).mkdir()
@@ -158,6 +170,9 @@ def test_state_folders_give_the_same_files_twice(recordings: Path, run: Run, tmp
         (("--layout", "kitti"), 2, "kitti"),
         (("--layout", "deepdoors2", "--roll", "90"), 2, "--layout"),
         (("--all",), 2, "--all"),
+        (("--changed",), 2, "--changed"),
+        (("--changed", "--all", "--out", "report"), 2, "--changed"),
+        (("--changed", "--rule", "plane_state", "--out", "report"), 2, "--changed"),
         (("--rule", "plane_state", "--points", "512"), 2, "points"),
         (("--out", "index.csv/report"), 1, "index.csv/report/frames.html"),
     ],

@@ -130,10 +130,10 @@ def test_a_column_of_the_index_does_not_replace_a_prediction(
 
 
 def test_frames_that_most_methods_missed_come_first(results: FrameResults) -> None:
-    chosen = choose_frames(results, all_frames=True)
+    chosen = choose_frames(results, "all")
     misses = [len(results.misclassified_by(number)) for number in chosen]
     assert sorted(chosen) == [0, 1, 2, 3, 4]
     assert misses == sorted(misses, reverse=True)
-    wrong_only = choose_frames(results, all_frames=False)
+    wrong_only = choose_frames(results)
     assert wrong_only == [number for number in chosen if results.misclassified_by(number)]
-    assert choose_frames(results, all_frames=True, limit=2) == chosen[:2]
+    assert choose_frames(results, "all", limit=2) == chosen[:2]

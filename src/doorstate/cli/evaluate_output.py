@@ -6,7 +6,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from doorstate import __version__
 from doorstate._files import write_text
@@ -14,10 +14,9 @@ from doorstate._paths import csv_name
 from doorstate.cli.console import print_table, stdout
 from doorstate.cli.progress import progress_bar
 from doorstate.evaluation.tables import save_tables
-from doorstate.viewer.frame_page import choose_frames, make_cards, render_frame_page
+from doorstate.viewer.frame_page import ShownFrames, choose_frames, make_cards, render_frame_page
 
 if TYPE_CHECKING:
-    from doorstate.evaluation.frame_scores import FrameScores
     from doorstate.evaluation.frames import FrameResults, Predictors
     from doorstate.evaluation.table import Table
 
@@ -39,10 +38,10 @@ def write_frame_report(
     folder: Path,
     predictors: Predictors,
     results: FrameResults,
-    scores: FrameScores,
+    values: Mapping[str, Any],
     tables: Mapping[str, Table],
     notes: Sequence[str],
-    all_frames: bool,
+    shown: ShownFrames,
 ) -> Path:
     """Write predictions, metrics, tables and the page into a folder, and return the path of the page.
 
@@ -51,10 +50,10 @@ def write_frame_report(
         folder: folder of the frames.
         predictors: predictors by name.
         results: their predictions.
-        scores: scores of the predictions.
+        values: scores of the predictions as JSON values.
         tables: tables of the scores.
         notes: notes to read before the numbers.
-        all_frames: show all frames on the page, not only errors.
+        shown: frames on the page.
     """
     name = folder.resolve().name
     table = results.joined.drop(columns="correct").rename(columns={"sample_id": "file"})
@@ -64,12 +63,12 @@ def write_frame_report(
         "doorstate": __version__,
         "folder": name,
         "unreadable": {frame.file: reason for frame, reason in results.unreadable},
-        **scores.to_json(),
+        **values,
     }
     write_text(out / "metrics.json", json.dumps(metrics, indent=2) + "\n")
     save_tables(tables, out / "tables")
     with progress_bar("Writing the page") as progress:
-        cards = make_cards(results, predictors, choose_frames(results, all_frames), progress)
+        cards = make_cards(results, predictors, choose_frames(results, shown), progress)
     page = out / PAGE
-    write_text(page, render_frame_page(name, tables, results, cards, notes))
+    write_text(page, render_frame_page(name, tables, results, cards, notes, shown))
     return page

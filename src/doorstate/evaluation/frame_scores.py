@@ -14,7 +14,7 @@ from doorstate.evaluation.intervals import Interval, bootstrap_f1, bounds, group
 from doorstate.evaluation.metrics import confusion, macro_f1, ratio
 from doorstate.types import ABSTAINED, PREDICTED_LABELS, STATES
 
-_MIN_GROUPS = 5  # chosen: resamples of fewer are too much alike
+MIN_GROUPS = 5  # chosen: resamples of fewer are too much alike
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +34,8 @@ class FrameScores:
     recall: pd.DataFrame  # method, state, frames, groups, correct, recall with bounds
     confusion: pd.DataFrame  # method, state, one column a predicted label
     strata: Mapping[str, pd.DataFrame]
+    stratum_groups: Mapping[str, str]
+    """Column of the groups of a stratum that are not those of the other tables."""
     without_door: pd.DataFrame
     """Method, label, frames, predicted_states with bounds, one column a state, median and max probability."""
 
@@ -45,13 +47,16 @@ class FrameScores:
             "groups": self.groups,
             "states": dict(self.states),
             "constant": self.constant,
-            **{name: _records(table) for name, table in tables.items()},
-            "strata": {name: _records(table) for name, table in self.strata.items()},
+            **{name: records(table) for name, table in tables.items()},
+            "strata": {name: records(table) for name, table in self.strata.items()},
         }
 
 
 def score_frames(
-    predictions: pd.DataFrame, groups: pd.Series[str], strata: Mapping[str, pd.Series[str]]
+    predictions: pd.DataFrame,
+    groups: pd.Series[str],
+    strata: Mapping[str, pd.Series[str]],
+    stratum_groups: Mapping[str, tuple[str, pd.Series[str]]] | None = None,
 ) -> FrameScores:
     """Score the predictions of every method.
 
@@ -59,7 +64,10 @@ def score_frames(
         predictions: N rows with columns method, state, predicted, the probabilities, and correct.
         groups: N names; frames with the same name depend on each other.
         strata: N values to score separately by, by name of the stratum.
+        stratum_groups: column and N names, in place of `groups`, by name of the stratum; within one door, frames of one
+            moment depend on each other.
     """
+    nested = stratum_groups or {}
     is_door = predictions["state"].isin(STATES)
     doors = predictions.assign(group=groups)[is_door]
     methods = predictions["method"].drop_duplicates().tolist()
@@ -92,12 +100,15 @@ def score_frames(
             name: pd.DataFrame(
                 [
                     {"method": method, "value": value, **_score(rows)}
-                    for method, of_method in doors.assign(value=values[is_door]).groupby("method", sort=False)
+                    for method, of_method in doors.assign(
+                        value=values[is_door], group=nested.get(name, ("", groups))[1][is_door]
+                    ).groupby("method", sort=False)
                     for value, rows in of_method.groupby("value", sort=False)
                 ]
             )
             for name, values in strata.items()
         },
+        {name: column for name, (column, _) in nested.items()},
         _score_without_door(predictions[~is_door]),
     )
 
@@ -125,7 +136,7 @@ def _share(rows: pd.DataFrame, name: str) -> dict[str, Any]:
 
 
 def _f1_interval(rows: pd.DataFrame, clusters: pd.Series[Any]) -> Interval:
-    if clusters.nunique() < _MIN_GROUPS:
+    if clusters.nunique() < MIN_GROUPS:
         return float("nan"), float("nan")
     return bootstrap_f1(rows, clusters, np.random.default_rng(0)).macro
 
@@ -160,6 +171,7 @@ def _score_without_door(predictions: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def _records(table: pd.DataFrame) -> list[dict[str, Any]]:
+def records(table: pd.DataFrame) -> list[dict[str, Any]]:
+    """Return the rows of a table as JSON values, NaN as None."""
     rows = table.to_dict("records")
     return [{str(key): None if value != value else value for key, value in row.items()} for row in rows]

@@ -35,7 +35,12 @@ def frame_tables(scores: FrameScores, group: str = NO_GROUP) -> dict[str, Table]
             scores.confusion,
             (_METHOD, label_column("state", "true state"), *map(count_column, PREDICTED_LABELS)),
         ),
-        **{f"by_{name.replace(':', '_')}": _stratum_table(scores, name, group) for name in scores.strata},
+        **{
+            f"by_{name.replace(':', '_')}": _stratum_table(
+                scores, name, scores.stratum_groups.get(name, group)
+            )
+            for name in scores.strata
+        },
         "without_door": _without_door_table(scores),
     }
     return {name: table for name, table in tables.items() if table.rows}

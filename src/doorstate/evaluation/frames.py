@@ -11,8 +11,10 @@ from functools import cached_property
 import pandas as pd
 
 from doorstate._jobs import Progress, no_progress
+from doorstate.dataset.frame_index import DOOR_COLUMN, MOMENT_COLUMN
 from doorstate.dataset.labelled import LabelledFrame, check_column
 from doorstate.errors import DoorstateError
+from doorstate.evaluation.frame_comparison import FrameComparison, changed_label, compare_methods
 from doorstate.evaluation.frame_scores import FrameScores, score_frames
 from doorstate.evaluation.labelled_doors import prediction_at
 from doorstate.evaluation.manifest import text_values
@@ -88,11 +90,38 @@ class FrameResults:
         """
         for name in (*by, *([group] if group else ())):
             check_column(self.frames, name.partition(":")[0])
+        nested = {
+            name: (MOMENT_COLUMN, self._groups(MOMENT_COLUMN))
+            for name in by
+            if name == group and self._has(MOMENT_COLUMN)
+        }
+        strata = {name: self._stratum(name) for name in by}
+        return score_frames(self.joined, self._groups(group), strata, nested)
+
+    def compare(self, group: str | None = None) -> FrameComparison:
+        """Compare the methods with the first one, and tell how sure the accuracy is by frames, moments and doors.
+
+        Args:
+            group: column of the index by which frames depend on each other; None: they do not.
+        """
+        columns = [name for name in (MOMENT_COLUMN, DOOR_COLUMN) if self._has(name)]
+        columns += [group] if group and group not in columns else []
+        units = {"frame": self._groups(None), **{name: self._groups(name) for name in columns}}
+        return compare_methods(self.joined, units, group or "frame")
+
+    def change_of(self, number: int) -> str:
+        """Return how the last method changes what the first one says of a frame (`changed_label`)."""
+        labels = [predictions[number].label for predictions in self.outputs.values()]
+        return changed_label(labels[0], labels[-1], self.frames[number].label)
+
+    def _has(self, column: str) -> bool:
+        return any(frame.columns.get(column) for frame in self.frames)
+
+    def _groups(self, column: str | None) -> pd.Series[str]:
+        """Return the names of a column; a frame without one is a group of its own."""
         file = self.joined["sample_id"]
-        groups = file if group is None else text_values(self.joined, group)
-        # A frame without a group is a group of its own; no value of a column starts as these do.
-        groups = groups.where(groups != "", "/" + file)
-        return score_frames(self.joined, groups, {name: self._stratum(name) for name in by})
+        names = file if column is None else text_values(self.joined, column)
+        return names.where(names != "", "/" + file)  # no value of a column starts as these do
 
     def _stratum(self, name: str) -> pd.Series[str]:
         column, colon, word = name.partition(":")
@@ -101,6 +130,12 @@ class FrameResults:
             return values.where(values != "", "unknown")
         contains = values.str.contains(word, case=False, regex=False)
         return contains.map({True: word, False: f"not {word}"})
+
+
+def default_group(frames: Sequence[LabelledFrame]) -> str | None:
+    """Return the column by which frames depend on each other: door, else moment; None if no frame has one of them."""
+    names = (DOOR_COLUMN, MOMENT_COLUMN)
+    return next((name for name in names if any(frame.columns.get(name) for frame in frames)), None)
 
 
 def evaluate_frames(

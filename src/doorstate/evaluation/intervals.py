@@ -94,6 +94,28 @@ def bootstrap_f1(
     )
 
 
+def bootstrap_mean(
+    values: NDArray[Any],
+    clusters: Sequence[str] | pd.Series[Any],
+    generator: np.random.Generator,
+    resamples: int = RESAMPLES,
+) -> Interval:
+    """Bootstrap the mean of N values by drawing whole clusters with replacement (percentile method).
+
+    Args:
+        values: (N,) numbers.
+        clusters: N names; values of one name are drawn together.
+        generator: source of the draws.
+        resamples: number of bootstrap samples.
+    """
+    if len(values) == 0:
+        return _UNDEFINED
+    _, cluster = np.unique(np.asarray(clusters, dtype=object), return_inverse=True)
+    sums, sizes = np.bincount(cluster, values), np.bincount(cluster)
+    draws = generator.multinomial(len(sizes), np.full(len(sizes), 1 / len(sizes)), size=resamples)
+    return _percentile_interval((draws @ sums) / (draws @ sizes))
+
+
 def _percentile_interval(values: NDArray[Any] | Floats) -> Interval:
     defined = values[~np.isnan(values)]  # the F1 of a state is undefined in a resample without it
     if len(defined) == 0:

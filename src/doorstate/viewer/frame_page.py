@@ -6,9 +6,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
+from typing import Literal
 
 from doorstate import __version__
 from doorstate._jobs import Progress, no_progress
+from doorstate.dataset.frame_index import PLACE_COLUMNS
 from doorstate.dataset.labelled import LabelledFrame
 from doorstate.evaluation.errors import missed_by
 from doorstate.evaluation.frames import FrameResults, Predictors
@@ -24,7 +26,9 @@ from doorstate.viewer.frame_pictures import frame_pictures
 from doorstate.viewer.named_clouds import NamedCloud
 
 MAX_CARDS = 200
-# Columns of the index that are not listed on a card: camera, file names and origin.
+ShownFrames = Literal["errors", "all", "changed"]
+CHANGES = ("broken", "corrected", "changed")  # the order on the page
+# Columns of the index that are not listed on a card: camera, file names, origin and place.
 _HIDDEN_COLUMNS = {
     "rgb",
     "width",
@@ -40,6 +44,10 @@ _HIDDEN_COLUMNS = {
     "quaternion",
     "source",
     "licence",
+    "camera_height_m",
+    "topic",
+    "stamp_s",
+    *PLACE_COLUMNS,
 }
 
 
@@ -54,6 +62,7 @@ class FrameCard:
         pictures: data URIs by name.
         entries: cloud and prediction of each method.
         misclassified_by: methods that were wrong.
+        change: how the last method changes what the first one says.
     """
 
     file: str
@@ -62,18 +71,24 @@ class FrameCard:
     pictures: Mapping[str, str]
     entries: Mapping[str, Entry]
     misclassified_by: tuple[str, ...]
+    change: str = ""
 
 
-def choose_frames(results: FrameResults, all_frames: bool, limit: int = MAX_CARDS) -> list[int]:
-    """Return the numbers of the frames to show, in descending order of the number of wrong methods.
+def choose_frames(results: FrameResults, shown: ShownFrames = "errors", limit: int = MAX_CARDS) -> list[int]:
+    """Return the numbers of the frames to show: those with most wrong methods first, changes by their kind.
 
     Args:
         results: predictions for the frames.
-        all_frames: include frames that all methods got right.
+        shown: frames that a method got wrong, all frames, or those of which the first and the last method say different
+            things.
         limit: largest number of frames.
     """
-    misses = [len(results.misclassified_by(number)) for number in range(len(results.frames))]
-    candidates = [number for number, count in enumerate(misses) if all_frames or count]
+    numbers = range(len(results.frames))
+    if shown == "changed":
+        kinds = {number: kind for number in numbers if (kind := results.change_of(number))}
+        return sorted(kinds, key=lambda number: CHANGES.index(kinds[number]))[:limit]
+    misses = [len(results.misclassified_by(number)) for number in numbers]
+    candidates = [number for number, count in enumerate(misses) if shown == "all" or count]
     return sorted(candidates, key=lambda number: -misses[number])[:limit]
 
 
@@ -104,6 +119,7 @@ def make_cards(
                     for name, predictor in predictors.items()
                 },
                 misclassified_by=tuple(results.misclassified_by(number)),
+                change=results.change_of(number),
             )
         )
         progress(done, len(numbers))
@@ -124,6 +140,7 @@ def render_frame_page(
     results: FrameResults,
     cards: Sequence[FrameCard],
     notes: Sequence[str] = (),
+    shown: ShownFrames = "errors",
 ) -> str:
     """Return the page.
 
@@ -133,6 +150,7 @@ def render_frame_page(
         results: predictions for the frames.
         cards: cards from `make_cards`.
         notes: notes to read before the numbers.
+        shown: frames that were chosen.
     """
     misclassified = sum(bool(results.misclassified_by(number)) for number in range(len(results.frames)))
     return render_page(
@@ -142,7 +160,8 @@ def render_frame_page(
         version=__version__,
         tables=tables,
         notes=notes,
-        groups=_groups(cards, len(results.outputs)),
+        groups=_groups_of_changes(cards) if shown == "changed" else _groups(cards, len(results.outputs)),
+        shown=shown,
         num_cards=len(cards),
         num_left_out=misclassified - sum(bool(card.misclassified_by) for card in cards),
         num_frames=len(results.frames),
@@ -164,6 +183,12 @@ def _groups(cards: Sequence[FrameCard], methods: int) -> list[tuple[str, list[Fr
     """Return the cards under headings, by the number of wrong methods."""
     by_misses = groupby(cards, lambda card: len(card.misclassified_by))
     return [(missed_by(misses, methods), list(group)) for misses, group in by_misses]
+
+
+def _groups_of_changes(cards: Sequence[FrameCard]) -> list[tuple[str, list[FrameCard]]]:
+    """Return the cards under headings, by the kind of the change."""
+    groups = [(kind, [card for card in cards if card.change == kind]) for kind in CHANGES]
+    return [(f"{len(group)} {kind}", group) for kind, group in groups if group]
 
 
 def _drawing(entry: Entry) -> Entry:
