@@ -387,6 +387,24 @@ def service(
     )
 
 
+@app.command()
+def stream(
+    out: Out,
+    hours: Annotated[float, typer.Option(help="Simulated length of the stream.", min=0.001)] = 24.0,
+    rows: Annotated[int, typer.Option(help="Measurements after the first one.", min=1)] = 12,
+    mqtt: Annotated[str, typer.Option(metavar="ADDRESS", help="Broker to publish to.")] = "mqtt://localhost",
+) -> None:
+    """Memory of a watch and its MQTT publisher over a day of frames, on an accelerated clock."""
+    from benchmarks.stream import measure_stream, stream_table
+    from doorstate.cli.progress import progress_bar
+    from doorstate.mqtt.settings import MqttSettings, parse_address
+
+    settings = MqttSettings.model_validate(parse_address(mqtt).model_dump() | {"camera": "benchmark"})
+    with progress_bar("stream") as progress:
+        measured = measure_stream(hours, rows, settings, progress)
+    store_results(out, "stream", measured, stream_table(measured), hours=hours)
+
+
 def main() -> None:
     """Run the command line; errors of the package are printed as one line."""
     try:

@@ -87,6 +87,7 @@ COMMANDS = {
     ("evaluate", "pcds"): "train",
     ("export",): "onnx",
     ("serve", "--port", "0"): "serve",
+    ("view", "--live", "pcds", "--rule", "plane_state", "--no-open", "--mqtt", "mqtt://localhost"): "mqtt",
     ("--help",): None,
 }
 CALLS = {
@@ -105,6 +106,7 @@ CALLS = {
     "import_module('doorstate.evaluation.metrics')": "train",
     "import_module('doorstate.inference.export')": "onnx",
     "import_module('doorstate.serving.app')": "serve",
+    "import_module('doorstate.mqtt.publisher')": "mqtt",
 }
 
 
@@ -170,7 +172,8 @@ def test_public_functions_work_or_name_the_extra(call: str, outcomes: Outcomes) 
 
 
 @pytest.mark.parametrize(
-    ("extra", "module"), [("serve", "doorstate.serving.app"), ("bags", "doorstate.io.bags")]
+    ("extra", "module"),
+    [("serve", "doorstate.serving.app"), ("bags", "doorstate.io.bags"), ("mqtt", "doorstate.mqtt.publisher")],
 )
 def test_an_extra_brings_all_that_its_feature_imports(extra: str, module: str, folder: Path) -> None:
     others = [name for name in OPTIONAL if name not in EXTRAS[extra]]

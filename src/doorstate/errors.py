@@ -12,6 +12,7 @@ DoorstateError
 ├── RunError               a training run or comparison folder cannot be used or continued
 ├── WeightsError           a weights file is missing, damaged, or made for another network
 ├── ExportError            a network cannot be exported, or the exported file disagrees with it
+├── BrokerError            a broker of MQTT refuses the connection
 ├── OutputError            a file cannot be written
 │   └── FolderInUseError   another process writes the folder
 └── MissingExtraError      an optional package is needed and not installed
@@ -151,6 +152,10 @@ class ExportError(DoorstateError):
     """A network cannot be exported, or the exported file disagrees with it."""
 
 
+class BrokerError(DoorstateError):
+    """A broker of MQTT refuses the connection."""
+
+
 class OutputError(DoorstateError):
     """A file cannot be written."""
 
@@ -178,6 +183,7 @@ EXTRAS = {
     "serve": ("fastapi", "uvicorn", "prometheus_client", "jinja2"),
     "bags": ("rosbags",),
     "cluster": ("ray",),
+    "mqtt": ("paho",),
 }
 """Modules of the optional dependencies, by the name of the extra that installs them (pyproject.toml)."""
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from doorstate.cli.mqtt_options import MqttOptions, with_mqtt_options
 from doorstate.cli.options import (
     Bag,
     BudgetMs,
@@ -40,6 +41,7 @@ Clouds = tuple[Iterable["NamedCloud"], int]
 """Clouds and their number."""
 
 
+@with_mqtt_options
 @with_reading_options
 def view(
     files: Annotated[
@@ -86,6 +88,7 @@ def view(
     ] = False,
     *,
     options: ReadOptions,
+    mqtt: MqttOptions,
 ) -> None:
     """Show clouds and predictions in the browser.
 
@@ -99,6 +102,7 @@ def view(
       doorstate view --bag run.bag --topic /camera/depth/points --every 15
       doorstate view --live --bag run.bag --topic /camera/depth/points
       doorstate view --live incoming/ --port 8080 --no-open
+      doorstate view --live incoming/ --no-open --mqtt mqtt://robot@broker.local --mqtt-camera hall
     """
     from doorstate._files import check_writable
     from doorstate.cli.predictors import Methods, load_predictor
@@ -112,6 +116,8 @@ def view(
     shown = Shown(known_door(door_known, door_pose, door_box), refused)
     if not live and (rate, port) != (None, 0):
         raise ConfigError("--rate and --port need --live")
+    if not live and mqtt.settings is not None:
+        raise ConfigError("--mqtt needs --live")
     if live and (out is not None or (files and (len(files) > 1 or not files[0].is_dir()))):
         raise ConfigError("--live needs one folder or --bag, and cannot be combined with --out")
     if out is not None:
@@ -130,7 +136,8 @@ def view(
             Methods(network, weights, rule), points, budget_ms=budget_ms, threads=threads, for_view=True
         )
         if live:
-            show_live(predictor, clouds, port, open_browser, shown)
+            with mqtt.open() as publisher:
+                show_live(predictor, clouds, port, open_browser, shown, publisher)
         else:
             show_page(predictor, clouds, total, out, open_browser, shown)
 

@@ -19,7 +19,9 @@ from doorstate.cli.progress import progress_bar
 from doorstate.cli.signals import accept_signal
 
 if TYPE_CHECKING:
+    from doorstate.inference.prediction import Prediction
     from doorstate.inference.predictor import Predictor
+    from doorstate.mqtt.publisher import MqttPublisher
     from doorstate.viewer.cloud_page import Shown
     from doorstate.viewer.named_clouds import NamedCloud
 
@@ -74,7 +76,12 @@ def show_page(
 
 
 def show_live(
-    predictor: Predictor, clouds: Iterable[NamedCloud], port: int, open_browser: bool, shown: Shown
+    predictor: Predictor,
+    clouds: Iterable[NamedCloud],
+    port: int,
+    open_browser: bool,
+    shown: Shown,
+    publisher: MqttPublisher | None = None,
 ) -> None:
     """Serve a page that shows clouds as they arrive, until Ctrl-C.
 
@@ -84,9 +91,19 @@ def show_live(
         port: port on this machine; 0 chooses a free one.
         open_browser: False only prints the address.
         shown: known door, and candidates to draw.
+        publisher: publishes the state of the door most in front.
     """
+    from doorstate.inference.state_filter import StateFilter
+    from doorstate.mqtt.status import status_of_front_door
     from doorstate.viewer.cloud_page import make_entry, render_cloud_page
     from doorstate.viewer.live_page import LivePage
+
+    state_filter = StateFilter()
+
+    def publish(prediction: Prediction) -> None:
+        if publisher is not None:
+            filtered = state_filter.update(prediction, time.monotonic())
+            publisher.update([status_of_front_door(prediction, filtered)])
 
     with LivePage(render_cloud_page(predictor, [], live=True), port) as page:
         print(page.address, flush=True)  # noqa: T201
@@ -95,7 +112,7 @@ def show_live(
             open_in_browser(page.address)
         try:
             for cloud in clouds:
-                page.publish("cloud", make_entry(predictor, cloud, format_flag, shown))
+                page.publish("cloud", make_entry(predictor, cloud, format_flag, shown, publish))
             page.publish("end", None)
             # Short sleeps: if another thread gets the signal of Ctrl-C, this one notices it only when it wakes up.
             while True:

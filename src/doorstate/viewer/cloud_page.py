@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,6 +18,7 @@ from doorstate.inference.door_lines import Line, door_lines
 from doorstate.inference.known import DoorKnown
 from doorstate.inference.network_predictor import NetworkPredictor
 from doorstate.inference.posed import predict_posed
+from doorstate.inference.prediction import Prediction
 from doorstate.inference.predictor import Predictor
 from doorstate.inference.serialization import prediction_to_dict
 from doorstate.pages.colors import STATE_COLORS
@@ -49,6 +50,7 @@ def make_entry(
     named: NamedCloud,
     parameter: WriteParameter = python_parameter,
     shown: Shown = SHOWN,
+    take: Callable[[Prediction], None] | None = None,
 ) -> Entry:
     """Predict a cloud, and encode the prediction with the points that were used, at most 4096.
 
@@ -57,12 +59,15 @@ def make_entry(
         named: cloud.
         parameter: how errors write parameters.
         shown: known door, and candidates to draw.
+        take: gets the prediction of a cloud that can be used.
     """
     entry: Entry = {"name": named.name, "truth": named.truth}
     try:
         if isinstance(named.cloud, DoorstateError):
             raise named.cloud
         prediction = predict_posed(predictor, named.cloud, named.pose, shown.door_known)
+        if take is not None:
+            take(prediction)
         prepared = predictor.prepare(named.cloud, is_level=prediction.tilt is None)
     except DoorstateError as error:
         return entry | {"error": error.describe(parameter, with_path=False)}
