@@ -13,6 +13,7 @@ DoorstateError
 ├── WeightsError           a weights file is missing, damaged, or made for another network
 ├── ExportError            a network cannot be exported, or the exported file disagrees with it
 ├── BrokerError            a broker of MQTT refuses the connection
+├── DoorFileError          a list of doors, poses of a camera, or a history of doors cannot be used
 ├── OutputError            a file cannot be written
 │   └── FolderInUseError   another process writes the folder
 └── MissingExtraError      an optional package is needed and not installed
@@ -154,6 +155,10 @@ class ExportError(DoorstateError):
 
 class BrokerError(DoorstateError):
     """A broker of MQTT refuses the connection."""
+
+
+class DoorFileError(DoorstateError):
+    """A list of doors, poses of a camera, or a history of doors cannot be used."""
 
 
 class OutputError(DoorstateError):

@@ -39,6 +39,7 @@ AbstentionCode = Literal[
     "opening_blocked",  # called open, but a surface fills the opening
     "leaf_out_of_view",
     "no_floor",  # neither in view nor known
+    "kind_without_state",  # of a door of a list
     "no_doorway",  # no wall with a place for a door
     "no_door",
     "unsure",
@@ -98,6 +99,7 @@ SENTENCES: dict[AbstentionCode, str] = {
     "opening_blocked": "called open, but a surface fills {share:.0%} of the opening",
     "leaf_out_of_view": "called semi-open, but no leaf was seen: it is out of view, or nothing came back from it",
     "no_floor": "the floor is not in view, and the height of the camera is not given",
+    "kind_without_state": "a {kind} door has no state",
     "no_doorway": "no wall in view has a place for a door",
     "no_door": "there seems to be no door: its probability is {probability:.2f}",
     "unsure": "unsure: {state} has probability {probability:.2f}, these weights need {min_probability:.2f}",

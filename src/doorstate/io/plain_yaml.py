@@ -32,3 +32,13 @@ def plain_documents(text: str) -> Iterator[Any]:
     """
     documents: Iterator[Any] = yaml.load_all(text, Loader=_PlainLoader)
     return documents
+
+
+def plain_node(text: str) -> yaml.Node | None:
+    """Return the tree of the one document of a YAML text, with its lines; None of an empty text.
+
+    Raises:
+        yaml.YAMLError: no YAML, several documents, or an alias.
+    """
+    node: yaml.Node | None = yaml.compose(text, Loader=_PlainLoader)
+    return node

@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Predictions with the names of doors: the doors of a cloud, those that are asked for at their places, and events."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from doorstate.doors.camera_place import CameraPlace, MissingPlace
+from doorstate.doors.sighting import View
+from doorstate.doors.tracker import DoorTracker, TrackedFrame
+from doorstate.inference.door import Door
+from doorstate.inference.known import DoorHint
+from doorstate.inference.posed import predict_posed
+from doorstate.inference.prediction import Prediction
+from doorstate.inference.predictor import Predictor
+from doorstate.io.sensor_pose import SensorPose
+from doorstate.types import Points
+
+_SAME_M = 1.0  # between a place that is asked for and the answer
+
+
+class NamedPrediction(NamedTuple):
+    """Prediction for one cloud, and what it says of the doors of a list."""
+
+    prediction: Prediction
+    tracked: TrackedFrame
+
+
+def predict_named(
+    predictor: Predictor,
+    points: Points,
+    pose: SensorPose | None,
+    tracker: DoorTracker,
+    camera: CameraPlace | MissingPlace,
+    stamp_s: float,
+    *,
+    frame: str = "",
+    asks: bool = False,
+) -> NamedPrediction:
+    """Predict a cloud, and match its doors to those of a tracker.
+
+    Args:
+        predictor: weights for doorways; other methods find one door, and cannot be asked.
+        points: points in the body frame, as read.
+        pose: pose that was applied to the points; None for level ones.
+        tracker: doors of the list.
+        camera: pose of the camera in the map.
+        stamp_s: time of the cloud.
+        frame: name of the cloud, for events.
+        asks: ask for doors in view that were not found, at the cost of one more prediction for each.
+
+    Raises:
+        CloudContentError, ConfigError: as in `Predictor.__call__`.
+    """
+    prediction = predict_posed(predictor, points, pose)
+
+    def ask(hint: DoorHint) -> Door | None:
+        answer = predict_posed(predictor, points, pose, hint)
+        door = answer.doors[0] if answer.doors else None
+        is_near = door is not None and np.hypot(door.x_m - (hint.x_m or 0), door.y_m - (hint.y_m or 0)) <= _SAME_M
+        return door if is_near else None
+
+    level = points if prediction.tilt is None else prediction.tilt.to_level(points)
+    tracked = tracker.update(
+        prediction, camera, stamp_s, View.of(level), frame=frame, ask=ask if asks else None
+    )
+    return NamedPrediction(prediction, tracked)
