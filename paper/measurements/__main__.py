@@ -115,6 +115,45 @@ def doors(
     )
 
 
+@app.command("named_doors")
+def named_doors(
+    out: Out = Path("docs/benchmarks"),
+    weights: Annotated[
+        str, typer.Option(help="Weights for doorways, by name or path; the default network if left out.")
+    ] = "",
+    sensor: Annotated[str, typer.Option(help="Sensor model.")] = "d435",
+    drives: Annotated[int, typer.Option(help="Drives, each along another corridor.", min=1)] = 1,
+    frames: Annotated[int, typer.Option(help="Frames of each drive.", min=2)] = 300,
+    asks: Annotated[bool, typer.Option("--ask", help="Ask for doors that were not found.")] = False,
+    seed: Annotated[int, typer.Option(help="Seed of the corridors.")] = 1_000_003,
+) -> None:
+    """Count right states of named doors on drives along a corridor, and doors taken for their neighbours."""
+    from doorstate.cli.progress import progress_bar
+    from doorstate.errors import ConfigError
+
+    from .doors import load_doorway_predictor
+    from .named_doors import measure_named_doors, named_doors_table
+
+    try:
+        predictor = load_doorway_predictor(weights or None)
+    except ConfigError as error:
+        raise typer.BadParameter(str(error), param_hint="--weights") from error
+    with progress_bar("named doors") as progress:
+        results = measure_named_doors(predictor, sensor, drives, frames, asks, progress, seed)
+    card = predictor.card
+    _write(
+        named_doors_table(*results, drives * frames),
+        out / "named-doors.md",
+        network=card.network,
+        trained_on=card.trained_on,
+        sensor=sensor,
+        drives=drives,
+        frames=frames,
+        ask=asks,
+        seed=seed,
+    )
+
+
 @app.command()
 def doorway_gate(
     out: Out = Path("docs/benchmarks"),
