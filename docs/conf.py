@@ -115,9 +115,15 @@ def _sidebar(index: str) -> str:
 
 def _command_help() -> list[str]:
     names = [command.callback.__name__ for command in command_line.registered_commands if command.callback]
+    for group in command_line.registered_groups:
+        assert group.typer_instance is not None
+        names += [
+            f"{group.typer_instance.info.name} {command.name}"
+            for command in group.typer_instance.registered_commands
+        ]
     texts = [
         CliRunner()
-        .invoke(command_line, [name, "--help"], prog_name="doorstate", env={"COLUMNS": "100"})
+        .invoke(command_line, [*name.split(), "--help"], prog_name="doorstate", env={"COLUMNS": "100"})
         .output
         for name in names
     ]

@@ -47,6 +47,7 @@ _PLACES = ((0, 3.2), (0, 4.6), (2, 6.0), (0, 8.5), (2, 9.0), (2, 10.4), (0, 9.9)
 _LIST_ERROR_M = 0.03
 _SWEEP_DEG, _SWEEP_S = 45.0, 4.0
 _LEAF_PX = 150
+_REACH_M = 4.8  # of the doors of the presets that the weights are trained on
 _MOST_BESIDE_DEG = 80.0
 _MISTAKEN_M = 0.5
 
@@ -110,7 +111,8 @@ def measure_named_doors(
             prediction, tracked = predict_named(
                 predictor, frame.points, camera_pose("ros"), tracker, place, stamp_s, asks=asks
             )
-            named += _named_results(drive, tracked.sightings, truths)
+            half_view_deg = row.camera.hfov_deg / 2
+            named += _named_results(drive, tracked.sightings, truths, half_view_deg)
             unknown.append(_unknown_result(prediction.doors, tracked, truths))
             progress(drive * frames + number + 1, drives * frames)
     return named, unknown
@@ -140,9 +142,10 @@ def named_doors_table(results: Sequence[NamedResult], unknown: Sequence[UnknownR
         f"{frames} frames in {DRIVE_S:g} s along it and back, with a camera that turns {_SWEEP_DEG:g} degrees to both "
         f"sides. Errors of the camera's place have a standard deviation of {100 * POSITION_ERROR_M:g} cm and "
         f"{YAW_ERROR_DEG:g} degrees in every frame, those of the list {100 * _LIST_ERROR_M:g} cm. Every door has one "
-        "state on the way there and another draw on the way back; kinds as in the preset `corridor` without full glass. "
-        f"A sighting is decidable if {VISIBLE_PX} pixels see leaf, frame or opening, {_LEAF_PX} of them the leaf, at "
-        f"most {_MOST_BESIDE_DEG:g} degrees beside the normal. Answers without a name: {sums['listed']} at doors of the "
+        "state on the way there and another draw on the way back; kinds as in the preset `corridor` without full "
+        f"glass. A sighting is decidable if {VISIBLE_PX} pixels see leaf, frame or opening and {_LEAF_PX} of them the "
+        f"leaf, the middle of the opening is in view and at most {_REACH_M:g} m away, and the camera at most "
+        f"{_MOST_BESIDE_DEG:g} degrees beside its normal. Answers without a name: {sums['listed']} at doors of the "
         f"list, {sums['unlisted']} at the other door, {sums['none']} at no door. The door in no list got the name of "
         f"another {sums['unlisted_named']} times.",
     )
@@ -257,15 +260,17 @@ def _in_order(row: Row, frame: Frame, main: int) -> list[TrueDoor]:
     return [*others[:main], own, *others[main:]]
 
 
-def _is_decidable(door: TrueDoor) -> bool:
+def _is_decidable(door: TrueDoor, half_view_deg: float) -> bool:
     bearing_deg = math.degrees(math.atan2(door.y_m, door.x_m))
     beside_deg = abs(math.remainder(door.yaw_deg - 90 - bearing_deg, 360))
     seen = door.visible_px
-    return seen.total >= VISIBLE_PX and seen.leaf >= _LEAF_PX and beside_deg <= _MOST_BESIDE_DEG
+    is_seen = seen.total >= VISIBLE_PX and seen.leaf >= _LEAF_PX and beside_deg <= _MOST_BESIDE_DEG
+    is_ahead = math.hypot(door.x_m, door.y_m) <= _REACH_M and abs(bearing_deg) <= half_view_deg
+    return is_seen and is_ahead
 
 
 def _named_results(
-    drive: int, sightings: Sequence[Sighting], truths: Sequence[TrueDoor]
+    drive: int, sightings: Sequence[Sighting], truths: Sequence[TrueDoor], half_view_deg: float
 ) -> Iterator[NamedResult]:
     for number, sighting in enumerate(sightings):
         truth = truths[number]
@@ -273,7 +278,7 @@ def _named_results(
         mistaken = sighting.door is not None and _nearest(sighting.door, truths) not in (number, None)
         yield NamedResult(
             drive,
-            _is_decidable(truth),
+            _is_decidable(truth, half_view_deg),
             str(truth.state),
             sighting.is_seen,
             sighting.asked,

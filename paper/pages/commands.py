@@ -41,12 +41,14 @@ def content() -> Mapping[str, Any]:
 
 def summaries() -> dict[str, str]:
     """Return the first line of the help of each command."""
-    return {name: (command.help or "").strip().partition("\n")[0] for name, command in _commands().items()}
+    return {
+        name: (command.help or "").strip().partition("\n")[0] for name, command in named_commands().items()
+    }
 
 
 def list_options() -> Iterator[Option]:
     """Yield the options of all commands; arguments have none."""
-    for name, command in _commands().items():
+    for name, command in named_commands().items():
         for parameter in command.params:
             flag = parameter.opts[0]
             if flag.startswith("--") and flag != "--help":
@@ -61,6 +63,13 @@ def share_options(options: list[Option]) -> list[SharedOption]:
     return [SharedOption(flag, names, text) for (flag, text), names in commands.items()]
 
 
-def _commands() -> dict[str, Any]:
-    commands: dict[str, Any] = typer.main.get_command(app).commands  # type: ignore[attr-defined]
+def named_commands() -> dict[str, Any]:
+    """Return the commands by name; those of a group as `group command`."""
+    commands: dict[str, Any] = {}
+    for name, command in typer.main.get_command(app).commands.items():  # type: ignore[attr-defined]
+        members = getattr(command, "commands", None)
+        if members is None:
+            commands[name] = command
+        else:
+            commands |= {f"{name} {member}": inner for member, inner in members.items()}
     return commands

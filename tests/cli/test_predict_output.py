@@ -65,8 +65,8 @@ def printed(
 
 def test_row_shows_probability_angle_width_and_distance(monkeypatch: pytest.MonkeyPatch) -> None:
     titles, row = printed([("a.pcd", ANSWER)], monkeypatch)
-    assert titles.split() == ["file", "state", "prob.", "angle", "passable", "distance", "ms"]
-    assert row.split() == ["a.pcd", "open", "0.95", "87°", "0.81", "m", "5.00", "m", "26"]
+    assert titles.split() == ["file", "state", "door", "prob.", "angle", "passable", "distance", "ms"]
+    assert row.split() == ["a.pcd", "open", "─┨", "┠─", "0.95", "87°", "0.81", "m", "5.00", "m", "26"]
 
 
 def test_numbers_are_rounded_once(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -86,7 +86,7 @@ def test_reason_is_below_its_row_without_numbers_that_look_like_an_answer(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     _, row, reason = printed([("a.pcd", REFUSED)], monkeypatch)
-    assert row.split() == ["a.pcd", "abstained", "-", "-", "-", "-", "25"]
+    assert row.split() == ["a.pcd", "abstained", "─┨", "?", "┠─", "-", "-", "-", "-", "25"]
     assert reason.strip() == REFUSED["reason"].strip()
 
 
@@ -171,6 +171,56 @@ def test_further_doors_stand_below_their_cloud(monkeypatch: pytest.MonkeyPatch) 
     assert "unsure" in lines[3]
     short = printed([("a.pcd", ANSWER | {"doors": DOORS})], monkeypatch, width=100)
     assert len({line.index("2.83 m" if "2.83 m" in line else "3.00 m") for line in short[1:3]}) == 1
+
+
+def named_answer() -> dict[str, Any]:
+    doors = [door | {"name": name} for door, name in zip(DOORS, ("kitchen", "unknown door"), strict=True)]
+    sightings = [
+        {"id": "kitchen", "seen": True, "state": "open"},
+        {"id": "hall", "seen": False, "state": None, "reason": "not seen: out of view"},
+        {"id": "attic", "seen": False, "state": None, "reason": "not seen: out of view"},
+        {"id": "cellar", "seen": True, "asked": True, "state": "closed"},
+    ]
+    return ANSWER | {"doors": doors, "named_doors": sightings}
+
+
+def test_doors_of_a_list_have_their_names_and_the_others_a_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+    lines = printed([("corridor/left/frame-000123.pcd", named_answer())], monkeypatch, width=100)
+    assert "kitchen, ahead" in lines[2]
+    assert "unknown door, 45° left" in lines[3]
+    assert lines[-2].strip() == "hall, attic: not seen: out of view"
+    assert lines[-1].strip().startswith("cellar: closed")
+
+
+def test_doors_are_drawn_from_above_within_80_columns(monkeypatch: pytest.MonkeyPatch) -> None:
+    screen = console.PrintingConsole(file=io.StringIO(), highlight=False, markup=False, soft_wrap=True)
+    monkeypatch.setattr(console, "stdout", screen)
+    monkeypatch.setattr(type(screen), "encoding", "utf-8")
+    table = PredictionTable("file", ["a.pcd"], ["pointnet2"], draws=True)
+    table.add("a.pcd", named_answer())
+    assert isinstance(screen.file, io.StringIO)
+    lines = screen.file.getvalue().splitlines()
+    assert max(map(len, lines)) <= 80
+    drawing = lines[next(row for row, line in enumerate(lines) if line.startswith("  cellar")) + 1 :]
+    assert "▲" in drawing[-1]
+    assert any("kitchen  open" in line for line in drawing)
+    assert any("\u2800" < character <= "\u28ff" for line in drawing for character in line)
+
+
+def test_an_output_without_unicode_gets_ascii(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(console.PrintingConsole, "encoding", "ascii")
+    lines = printed([("a.pcd", ANSWER | {"doors": DOORS}), ("b.pcd", REFUSED)], monkeypatch)
+    assert all(line.isascii() for line in lines)
+    assert "-[   ]-" in lines[1]
+
+
+def test_names_are_a_column_of_the_csv_file() -> None:
+    stream = io.StringIO()
+    write = WRITERS[".csv"](stream, "file", True)
+    write({"file": "a.pcd"} | named_answer())
+    write({"file": "b.pcd"} | REFUSED)
+    rows = list(csv.DictReader(io.StringIO(stream.getvalue())))
+    assert [row["name"] for row in rows] == ["kitchen", "unknown door", ""]
 
 
 def test_a_csv_file_has_a_row_for_each_door() -> None:

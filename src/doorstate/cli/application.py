@@ -13,6 +13,7 @@ import typer
 from doorstate import __version__
 from doorstate.cli.command import Command
 from doorstate.cli.compare import compare
+from doorstate.cli.doors_app import doors_app
 from doorstate.cli.evaluate import evaluate
 from doorstate.cli.export import export
 from doorstate.cli.export_sdf import export_sdf
@@ -59,6 +60,7 @@ app = typer.Typer(
 )
 for command in _COMMANDS:
     app.command(cls=Command)(command)
+app.add_typer(doors_app)
 
 
 def _print_version(requested: bool) -> None:

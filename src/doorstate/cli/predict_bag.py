@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from doorstate.cli.flags import format_flag
+from doorstate.cli.predicted_values import Asked, Moment, predicted_values
 from doorstate.cli.prediction_output import Output, Rows
 from doorstate.errors import CloudReadError, DoorstateError
 
 if TYPE_CHECKING:
-    from doorstate.inference.known import DoorKnown
     from doorstate.inference.predictor import Predictor
     from doorstate.io.bags import StampedCloud
     from doorstate.io.options import ReadOptions
@@ -26,7 +26,7 @@ def predict_bag(
     camera_info_topic: str | None,
     every: int,
     output: Output,
-    door: DoorKnown,
+    asked: Asked,
 ) -> None:
     """Write predictions for every Nth message of a topic.
 
@@ -38,7 +38,7 @@ def predict_bag(
         camera_info_topic: topic of the camera; None for the usual one.
         every: N.
         output: where the predictions go.
-        door: True, or a rough place, where a door is known to be in view.
+        asked: doors to ask for.
     """
     from doorstate.io.bags import open_bag
 
@@ -46,16 +46,15 @@ def predict_bag(
         chosen = bag.choose(topic)
         predictors = load()
         messages = bag.clouds(chosen, options, camera_info_topic, every)
-        clouds = _predict_messages(predictors, messages, door)
+        clouds = _predict_messages(predictors, messages, asked)
         output.write(clouds, list(predictors), [f"{0:.6f}".rjust(17)], -(-chosen.messages // every))
 
 
 def _predict_messages(
-    predictors: Mapping[str, Predictor], clouds: Iterable[StampedCloud], door: DoorKnown
+    predictors: Mapping[str, Predictor], clouds: Iterable[StampedCloud], asked: Asked
 ) -> Iterator[Rows]:
     """Yield the rows of each message; a bag that is damaged from somewhere on ends with an error row."""
-    from doorstate.inference.posed import predict_posed
-    from doorstate.inference.serialization import prediction_values
+    from doorstate.io.sensor_pose import PosedCloud
 
     try:
         for stamp_s, _, cloud, pose in clouds:
@@ -64,9 +63,12 @@ def _predict_messages(
                 if isinstance(cloud, DoorstateError):
                     raise cloud
                 rows = []
+                assert pose is not None
+                place = None if asked.doors is None else asked.doors.poses.at(stamp_s)
+                moment = Moment(f"{stamp_s:.6f}", stamp_s, place)
                 for method, predictor in predictors.items():
-                    prediction = predict_posed(predictor, cloud, pose, door)
-                    rows.append(row | {"method": method} | prediction_values(prediction, format_flag, pose))
+                    values = predicted_values(predictor, PosedCloud(cloud, pose), asked, moment)
+                    rows.append(row | {"method": method} | values)
                 yield rows
             except DoorstateError as error:
                 yield [row | {"error": error.describe(format_flag, with_path=False)}]

@@ -26,6 +26,8 @@ class Output(NamedTuple):
     noun: str
     path: Path | None = None  # file to write
     as_json: bool = False
+    draws: bool = False  # doors from above below each row of the table
+    is_named: bool = False  # doors have names
 
     @property
     def is_table(self) -> bool:
@@ -80,12 +82,12 @@ class Output(NamedTuple):
                 atomic_path(self.path) as temporary,
                 temporary.open("w", newline="", encoding="utf-8") as stream,
             ):
-                write_rounded = WRITERS[self.path.suffix](stream, self.key)
+                write_rounded = WRITERS[self.path.suffix](stream, self.key, self.is_named)
                 yield lambda row: write_rounded(rounded(row))
         elif self.as_json:
             yield lambda row: print_json(rounded(row))
         else:
-            table = PredictionTable(self.key.removesuffix("_s"), names, methods)
+            table = PredictionTable(self.key.removesuffix("_s"), names, methods, draws=self.draws)
 
             def write(row: dict[str, Any]) -> None:
                 if "error" not in row:
@@ -100,20 +102,29 @@ def _format_key(value: str | float | None) -> str:
     return value if isinstance(value, str) else f"{value:.6f}"
 
 
-def _json_writer(stream: TextIO, key: str) -> Write:
+def _json_writer(stream: TextIO, key: str, is_named: bool = False) -> Write:
     def write(row: dict[str, Any]) -> None:
         stream.write(json_line(row) + "\n")
 
     return write
 
 
-def _csv_writer(stream: TextIO, key: str) -> Write:
+def _csv_writer(stream: TextIO, key: str, is_named: bool = False) -> Write:
     from doorstate.inference.serialization import DOOR_FIELDS, OPTIONAL_FIELDS
     from doorstate.types import STATES
 
     common = [key, "method", "points", "milliseconds"]
     of_doors = [name for name in DOOR_FIELDS if name not in OPTIONAL_FIELDS and name not in _PLACE]
-    columns = [key, "method", "door", "state", *STATES, "points", "milliseconds"]
+    columns = [
+        key,
+        "method",
+        "door",
+        *(["name"] if is_named else []),
+        "state",
+        *STATES,
+        "points",
+        "milliseconds",
+    ]
     columns += [*OPTIONAL_FIELDS, *of_doors, "reason", "error"]
     writer = csv.DictWriter(stream, columns, lineterminator="\n")
     writer.writeheader()
@@ -143,5 +154,5 @@ def _by_door(row: dict[str, Any], columns: Sequence[str]) -> Iterator[dict[str, 
 _PLACE = {"x_m": "door_x_m", "y_m": "door_y_m", "yaw_deg": "door_yaw_deg", "width_m": "opening_width_m"}
 
 
-WRITERS: dict[str, Callable[[TextIO, str], Write]] = {".csv": _csv_writer, ".jsonl": _json_writer}
-"""Writers by the suffix of the file."""
+WRITERS: dict[str, Callable[..., Write]] = {".csv": _csv_writer, ".jsonl": _json_writer}
+"""Writers by the suffix of the file; each takes a stream, the field that names a cloud, and if doors have names."""

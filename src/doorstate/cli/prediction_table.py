@@ -12,6 +12,8 @@ from rich.text import Text
 
 from doorstate._paths import printable
 from doorstate.cli import console
+from doorstate.pages.plan import plan_of_record
+from doorstate.pages.plan_text import SIGN_WIDTH, ascii_only, door_sign, plan_text
 from doorstate.types import ABSTAINED
 
 _STATE_STYLES = {"closed": "red", "semi_open": "yellow", "open": "green"}
@@ -68,7 +70,9 @@ _COLUMNS = (
     _Column("ms", 5, _milliseconds),
 )
 _STATE_WIDTH = 9
-_CELLS_WIDTH = len(_GAP) + _STATE_WIDTH + sum(len(_GAP) + column.width for column in _COLUMNS)
+_CELLS_WIDTH = (
+    2 * len(_GAP) + SIGN_WIDTH + _STATE_WIDTH + sum(len(_GAP) + column.width for column in _COLUMNS)
+)
 
 
 class PredictionTable:
@@ -78,9 +82,13 @@ class PredictionTable:
         title: of the first column, such as "file".
         names: names of the first column, as far as they are known; they fit into it where the output is no terminal.
         methods: names of the methods; several are listed below the name of each cloud.
+        draws: draw the doors from above below each cloud.
     """
 
-    def __init__(self, title: str, names: Sequence[str], methods: Sequence[str]) -> None:
+    def __init__(
+        self, title: str, names: Sequence[str], methods: Sequence[str], *, draws: bool = False
+    ) -> None:
+        self._draws = draws
         self._by_method = len(methods) > 1
         self._title = title
         self._width = console.stdout.width if console.stdout.is_terminal else None
@@ -105,26 +113,58 @@ class PredictionTable:
             console.stdout.print(name, style="bold")
         self._last_name = name
         self._print_answer(f"  {row['method']}" if self._by_method else printable(name), row)
-        for number, door in enumerate(row.get("doors", ())[1:], 2):
-            indent = "    " if self._by_method else "  "
-            label = f"{indent}door {number}, {_side(door['bearing_deg'])}"
-            self._print_answer(label if len(label) <= self._name_width else f"{indent}{number}", door)
+        indent = "    " if self._by_method else "  "
+        doors = row.get("doors", ())
+        is_named = "named_doors" in row
+        for number, door in enumerate(doors if is_named else doors[1:], 1 if is_named else 2):
+            name = printable(door["name"]) if is_named else f"door {number}"
+            long, short = f"{indent}{name}, {_signs(_side(door['bearing_deg']))}", f"{indent}{name}"
+            if not is_named:
+                short = f"{indent}{number}"
+            self._print_answer(long if len(long) <= self._name_width else short, door)
+        for line in _not_seen(row.get("named_doors", ())):
+            self._print_reason(printable(line))
+        if self._draws and doors:
+            self._print_drawing(doors)
 
     def _print_answer(self, name: str, answer: dict[str, Any]) -> None:
         """Print a prediction, or one of its further doors."""
         line = Text(_fit(name, self._name_width))
         state = answer["state"]
         line.append(f"{_GAP}{state or ABSTAINED:<{_STATE_WIDTH}}", _STATE_STYLES.get(state, "bold"))
+        line.append(_GAP + _signs(door_sign(state, answer.get("hinge"))))
         for column in _COLUMNS:
-            line.append(f"{_GAP}{column.cell(answer):>{column.width}}")
+            line.append(f"{_GAP}{_signs(column.cell(answer)):>{column.width}}")
         console.stdout.print(line)
         if reason := answer.get("reason"):
             self._print_reason(printable(reason))
 
     def _print_titles(self) -> None:
-        titles = [f"{self._title:<{self._name_width}}", f"{'state':<{_STATE_WIDTH}}"]
+        titles = [
+            f"{self._title:<{self._name_width}}",
+            f"{'state':<{_STATE_WIDTH}}",
+            f"{'door':<{SIGN_WIDTH}}",
+        ]
         titles += [f"{column.title:>{column.width}}" for column in _COLUMNS]
         console.stdout.print(_GAP.join(titles), style="bold underline")
+
+    def _print_drawing(self, doors: Sequence[dict[str, Any]]) -> None:
+        """Print all doors from above, the robot at the foot, and what is known of each beside them."""
+        if not _has_signs():
+            return
+        drawing = plan_text(plan_of_record(doors))
+        notes = [note for number, door in enumerate(doors, 1) for note in _notes(number, door, len(doors))]
+        for row in range(max(len(drawing.lines), len(notes))):
+            blank = " " * len(drawing.lines[0])
+            line = Text("  " + (drawing.lines[row] if row < len(drawing.lines) else blank))
+            for mark in drawing.marks:
+                if mark.row == row:
+                    style = _STATE_STYLES.get(doors[mark.door]["state"], "bold")
+                    line.stylize(style, mark.column + 2, mark.column + 2 + mark.length)
+            if row < len(notes):
+                line.append(_GAP + notes[row][0], notes[row][1])
+            line.rstrip()
+            console.stdout.print(line)
 
     def _print_reason(self, reason: str) -> None:
         indent = "    " if self._by_method else "  "
@@ -135,6 +175,41 @@ class PredictionTable:
             )
         for line in lines:
             console.stdout.print(line, style="dim")
+
+
+def _not_seen(sightings: Sequence[dict[str, Any]]) -> list[str]:
+    """Return lines for the doors of a list that this cloud does not show: one for those with the same reason."""
+    names: dict[str, list[str]] = {}
+    for sighting in sightings:
+        if not sighting["seen"]:
+            names.setdefault(sighting.get("reason", ""), []).append(sighting["id"])
+        elif sighting.get("asked"):
+            answer = sighting["state"] or sighting.get("reason", ABSTAINED)
+            names.setdefault(f"{answer}, asked for at its place", []).append(sighting["id"])
+    return [f"{', '.join(ids)}: {reason}" for reason, ids in names.items()]
+
+
+def _notes(number: int, door: dict[str, Any], count: int) -> list[tuple[str, str]]:
+    """Return lines about a door beside the drawing, with their style."""
+    label = printable(door["name"]) if "name" in door else str(number) if count > 1 else ""
+    state = door["state"]
+    head = f"{label}  {state or ABSTAINED}".strip()
+    if (angle_deg := door.get("opening_angle_deg")) is not None and state not in (None, "closed"):
+        head += f" {angle_deg:.0f}°"
+    lines = [(head, _STATE_STYLES.get(state, "bold"))]
+    lines.append((f"  {door['distance_m']:.2f} m, {_side(door['bearing_deg'])}", ""))
+    if state is not None and (passable_m := door.get("passable_width_m")) is not None:
+        lines.append((f"  {passable_m:.2f} m of {door['width_m']:.2f} m free", ""))
+    return lines
+
+
+def _has_signs() -> bool:
+    """Return True if the output can show signs beyond ASCII."""
+    return (console.stdout.encoding or "").lower().startswith("utf")
+
+
+def _signs(text: str) -> str:
+    return text if _has_signs() else ascii_only(text)
 
 
 def _fit(name: str, width: int) -> str:

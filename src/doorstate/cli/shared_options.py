@@ -10,7 +10,7 @@ from typing import Any, get_type_hints
 
 Command = Callable[..., None]
 # Classes in annotations that are imported only when a command runs, so that `--help` is quick.
-_UNIMPORTED = dict.fromkeys(("ReadOptions", "Resources"), Any)
+_UNIMPORTED = dict.fromkeys(("NamedOptions", "ReadOptions", "Resources"), Any)
 
 
 def with_shared_options(read: Callable[..., Any], name: str) -> Callable[[Command], Command]:

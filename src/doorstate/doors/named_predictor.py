@@ -5,8 +5,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-
 from doorstate.doors.camera_place import CameraPlace, MissingPlace
 from doorstate.doors.sighting import View
 from doorstate.doors.tracker import DoorTracker, TrackedFrame
@@ -18,7 +16,7 @@ from doorstate.inference.predictor import Predictor
 from doorstate.io.sensor_pose import SensorPose
 from doorstate.types import Points
 
-_SAME_M = 1.0  # between a place that is asked for and the answer
+_LEAST_PROBABILITY = 0.1  # of a door that was asked for
 
 
 class NamedPrediction(NamedTuple):
@@ -59,8 +57,11 @@ def predict_named(
     def ask(hint: DoorHint) -> Door | None:
         answer = predict_posed(predictor, points, pose, hint)
         door = answer.doors[0] if answer.doors else None
-        is_near = door is not None and np.hypot(door.x_m - (hint.x_m or 0), door.y_m - (hint.y_m or 0)) <= _SAME_M
-        return door if is_near else None
+        # A state where the network sees no door at all says nothing of a door that is hidden.
+        is_door = door is not None and (
+            door.door_probability is None or door.door_probability >= _LEAST_PROBABILITY
+        )
+        return door if is_door else None
 
     level = points if prediction.tilt is None else prediction.tilt.to_level(points)
     tracked = tracker.update(

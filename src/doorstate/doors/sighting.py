@@ -117,8 +117,15 @@ class Sighting:
         abstention = None if self.door is None else self.door.abstention
         return "" if abstention is None else abstention.describe(parameter)
 
-    def to_dict(self, parameter: WriteParameter = python_parameter) -> dict[str, Any]:
-        """Return the sighting as JSON values; those of the door are given only where it is seen."""
+    def to_dict(
+        self, parameter: WriteParameter = python_parameter, *, has_time: bool = True
+    ) -> dict[str, Any]:
+        """Return the sighting as JSON values; those of the door are given only where it is seen.
+
+        Args:
+            parameter: writes a parameter that a reason suggests as the surface spells it.
+            has_time: False leaves out what earlier clouds showed.
+        """
         values: dict[str, Any] = {"id": self.id, "seen": self.is_seen, "state": None}
         if self.door is not None:
             values |= door_to_dict(self.door, parameter)
@@ -129,10 +136,10 @@ class Sighting:
             values["side"] = "front" if self.is_front else "back"
         if self.asked:
             values["asked"] = True
-        if self.filtered is not None:
-            values["filtered_state"] = None if self.filtered.state is None else str(self.filtered.state)
+        if has_time and self.filtered is not None and self.filtered.state is not None:
+            values["filtered_state"] = str(self.filtered.state)
             values["filtered_since_s"] = round(self.filtered.since_s, 6)
-        if self.last_seen_s is not None:
+        if has_time and self.last_seen_s is not None:
             values |= {"last_state": str(self.last_state), "last_seen_s": round(self.last_seen_s, 6)}
         return {name: value for name, value in values.items() if value is not None or name == "state"}
 

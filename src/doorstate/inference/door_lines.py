@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +14,7 @@ from doorstate.inference.prediction import Prediction
 
 DOOR_HEIGHT_M = 2.0  # of the drawing; no head predicts it
 _REFUSED_HEIGHT_M = 1.0  # lower than doors, so that both can be told apart where they overlap
-_SWING_DEG = 90.0  # a leaf is drawn with the way that it takes to be open
+SWING_DEG = 90.0  # a leaf is drawn with the way that it takes to be open
 _STEPS = 16
 _ANGLE_SHARE = 0.55  # radius of the arc of the angle, of the width of the leaf
 
@@ -26,6 +27,35 @@ class Line(NamedTuple):
     name: str
     points_m: NDArray[np.float64]  # (K, 3) level sensor frame
     label: str = ""  # at its end
+
+
+class LeafPlan(NamedTuple):
+    """Hinge and directions of a leaf in plan view.
+
+    It turns to the robot's side of the wall, because no head predicts to which side it swings.
+    """
+
+    hinge_m: NDArray[np.float64]  # (2,)
+    shut: NDArray[np.float64]  # (2,) unit vector from the hinge along the shut leaf
+    towards: NDArray[np.float64]  # (2,) unit vector of a leaf at 90 degrees
+
+    @classmethod
+    def of(cls, door: Door) -> LeafPlan | None:
+        """Return the leaf of a door; None without a hinge."""
+        if door.hinge is None:
+            return None
+        left, right = (np.array(end) for end in door.opening)
+        along = (left - right) / door.width_m  # along the wall, to its left
+        hinge, shut = (left, -along) if door.hinge == "left" else (right, along)
+        return cls(hinge, shut, np.array([-along[1], along[0]]))
+
+    def at(self, radius_m: float, angle_deg: float) -> NDArray[np.float64]:
+        """Return the place (2,) on the leaf, so far from the hinge, at an opening angle."""
+        angle = math.radians(angle_deg)
+        place: NDArray[np.float64] = self.hinge_m + radius_m * (
+            math.cos(angle) * self.shut + math.sin(angle) * self.towards
+        )
+        return place
 
 
 def door_lines(prediction: Prediction, floor_z_m: float, *, refused: bool = False) -> list[Line]:
@@ -47,16 +77,12 @@ def door_lines(prediction: Prediction, floor_z_m: float, *, refused: bool = Fals
 
 
 def _lines(door: Door, floor_z_m: float, label: str) -> list[Line]:
-    """Return the lines of one door, those that follow from its values.
-
-    The leaf is drawn on the robot's side of the wall, because no head predicts to which side it swings.
-    """
+    """Return the lines of one door, those that follow from its values."""
     frame = Line("door frame", _frame(door, floor_z_m, DOOR_HEIGHT_M), label)
-    if door.hinge is None:
+    leaf_plan = LeafPlan.of(door)
+    if leaf_plan is None:
         return [frame]
-    left, right = (np.array(end) for end in door.opening)
-    along = (left - right) / door.width_m  # along the wall, to its left
-    hinge, shut = (left, -along) if door.hinge == "left" else (right, along)
+    hinge = leaf_plan.hinge_m
     floor_m = _floor_m(door, floor_z_m)
     axis = Line("hinge", _upright(hinge, hinge, floor_m, DOOR_HEIGHT_M)[:2])
     if door.opening_angle_deg is None:
@@ -64,19 +90,17 @@ def _lines(door: Door, floor_z_m: float, label: str) -> list[Line]:
 
     def arc(radius_m: float, angle_deg: float) -> Place:
         """Return the (K, 3) places of an arc on the floor, from the shut leaf on."""
-        angles = np.radians(np.linspace(0.0, angle_deg, _STEPS))
-        towards_robot = np.array([-along[1], along[0]])
-        directions = np.outer(np.cos(angles), shut) + np.outer(np.sin(angles), towards_robot)
-        return np.column_stack([hinge + radius_m * directions, np.full(_STEPS, floor_m)])
+        places = [leaf_plan.at(radius_m, angle) for angle in np.linspace(0.0, angle_deg, _STEPS)]
+        return np.column_stack([places, np.full(_STEPS, floor_m)])
 
-    tip = arc(door.width_m, door.opening_angle_deg)[-1, :2]
+    tip = leaf_plan.at(door.width_m, door.opening_angle_deg)
     leaf = _upright(hinge, tip, floor_m, DOOR_HEIGHT_M)
     angle = f"{door.opening_angle_deg:.0f}°"
     return [
         frame,
         Line("leaf", np.concatenate([leaf, leaf[:1]])),
         Line("angle", arc(_ANGLE_SHARE * door.width_m, door.opening_angle_deg), angle),
-        Line("swing", arc(door.width_m, max(_SWING_DEG, door.opening_angle_deg))),
+        Line("swing", arc(door.width_m, max(SWING_DEG, door.opening_angle_deg))),
         axis,
     ]
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from doorstate.clouds.floor import lowest_z_m
 from doorstate.clouds.measured import is_measured
 from doorstate.clouds.preparation import NUM_POINTS
+from doorstate.doorways.finder import thinned
 from doorstate.errors import DoorstateError, WriteParameter, python_parameter
 from doorstate.inference.door_lines import Line, door_lines
 from doorstate.inference.known import DoorKnown
@@ -24,12 +25,14 @@ from doorstate.inference.serialization import prediction_to_dict
 from doorstate.pages.colors import STATE_COLORS
 from doorstate.pages.document import fill_page
 from doorstate.pages.encoding import encode_bytes, encode_cloud, encode_detections
+from doorstate.pages.plan import make_plan, plan_walls
+from doorstate.pages.plan_svg import plan_svg
 from doorstate.types import STATES, Points
 from doorstate.viewer.named_clouds import NamedCloud
 
 Entry = dict[str, Any]
-"""Cloud as the page gets it: `name` and `truth`, and either `error` or `prediction`, `cloud`, `whole`, `floor_z_m` and
-`detections`."""
+"""Cloud as the page gets it: `name` and `truth`, and either `error` or `prediction`, `cloud`, `whole`, `floor_z_m`,
+`plan` and `detections`."""
 
 WHOLE_POINTS = 8000  # of the whole cloud, drawn under the points that were used
 CHANNEL_STEPS = 32  # a channel count is stored in steps of 1/32, so that two bytes hold 0 to 2047
@@ -85,11 +88,21 @@ def make_entry(
         "cloud": encode_cloud(prepared.points[:NUM_POINTS], parts),
         "whole": encode_cloud(whole),
         "floor_z_m": round(floor_z_m, 3),
+        "plan": _plan(named.cloud, prediction, floor_z_m),
         "detections": [
             *encode_detections(prediction.detections),
             *map(_encode_line, door_lines(prediction, floor_z_m, refused=shown.refused)),
         ],
     }
+
+
+def _plan(cloud: Points, prediction: Prediction, floor_z_m: float) -> str:
+    """Return the doors from above as SVG; empty without any."""
+    if not prediction.doors:
+        return ""
+    sample = thinned(cloud)
+    level = sample if prediction.tilt is None else prediction.tilt.to_level(sample)
+    return plan_svg(make_plan(prediction, walls=plan_walls(level, floor_z_m)))
 
 
 def thin_for_display(cloud: Points, count: int = WHOLE_POINTS) -> Points:

@@ -161,6 +161,9 @@
           make("dd", { className: "number" }, `${(100 * p).toFixed(1)} %`)];
       }));
     element("reason").textContent = entry.error || prediction?.reason || "";
+    const plan = element("plan");
+    plan.hidden = !entry.plan;
+    if (entry.plan) plan.src = `data:image/svg+xml,${encodeURIComponent(entry.plan)}`;
     element("facts").replaceChildren(...(prediction ? facts(prediction) : []).filter(([, value]) => value).flatMap(
       ([name, value, className = ""]) => [make("dt", { className }, name), make("dd", { className }, value)]));
   }
