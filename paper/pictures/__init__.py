@@ -15,7 +15,7 @@ from doorstate.evaluation.figures.factors import factors_figure
 from doorstate.evaluation.figures.poses import errors_figure
 
 from .. import paths
-from . import buildings, door_kinds, reports, scenes, sensors, states, view
+from . import buildings, door_kinds, named_doors, reports, scenes, sensors, states, view
 
 COLORS = 128  # enough for all of them, and a third of the size
 
@@ -30,6 +30,7 @@ PICTURES: Mapping[str, Callable[[], bytes]] = {
     "buildings": buildings.draw,
     "sensors": sensors.draw,
     "view": view.draw,
+    "named-doors": named_doors.draw,
     "results-by-pose-errors": partial(reports.draw, "by-pose", "errors_in_plan", errors_figure),
     "related-factors": partial(reports.draw, "related", "factors", factors_figure),
     "generalization-factors": partial(reports.draw, "mixture-wide", "factors", factors_figure),

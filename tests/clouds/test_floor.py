@@ -61,3 +61,8 @@ def test_missing_points_are_left_out() -> None:
     assert find_floor_z_m(cloud) == pytest.approx(-1.0, abs=0.01)
     assert find_floor_z_m(np.full((4, 3), np.nan, np.float32)) is None
     assert find_floor_z_m(np.empty((0, 3), np.float32)) is None
+
+
+def test_a_point_that_rounds_to_the_edge_of_the_cells_is_no_error() -> None:
+    floor = np.full((100, 3), [5.99, np.nextafter(np.float32(3.6), np.float32(0)), -1.0], np.float32)
+    assert find_floor_z_m(floor) is None

@@ -87,6 +87,7 @@ def _layer_areas_m2(low: Points) -> tuple[NDArray[np.float64], NDArray[np.int64]
     slices = _slices(low)
     ahead = (low[:, 0] / _CELL_M).astype(np.int64)
     across = (low[:, 1] / _CELL_M + _ACROSS / 2).astype(np.int64)
+    across = np.minimum(across, _ACROSS - 1)  # the sum may round up to the edge
     occupied = np.zeros((_SLICES + _ABOVE.stop, _AHEAD * _ACROSS), np.bool_)
     occupied[slices, ahead * _ACROSS + across] = True
     layers = _union(occupied, range(_LAYER))

@@ -96,10 +96,10 @@ def _ticks(
 
 
 def _legend() -> Iterator[str]:
-    x = _WIDTH_PX - _RIGHT_PX - 330
+    x = _WIDTH_PX - _RIGHT_PX - 360
     for state, color in STATE_COLORS.items():
         yield f'<rect x="{x:.0f}" y="17" width="12" height="12" fill="{color}"/>'
         yield f'<text class="soft" x="{x + 18:.0f}" y="27.5" font-size="12">{STATE_WORDS[state]}</text>'
-        x += 84
+        x += 95
     yield f'<rect class="track" x="{x:.0f}" y="17" width="12" height="12"/>'
     yield f'<text class="soft" x="{x + 18:.0f}" y="27.5" font-size="12">not seen</text>'

@@ -10,7 +10,7 @@ from doorstate.pages.colors import STATE_COLORS, STATE_WORDS
 from doorstate.pages.plan import Place, Plan, PlanDoor
 from doorstate.pages.svg_text import svg_text
 
-_PX_PER_M = 90.0
+PX_PER_M = 90.0
 _MARGIN_PX = (100.0, 58.0)  # for labels at the sides, and above and below
 _MIN_WIDTH_M = 3.2
 _VIEW_M = 0.5  # length of the edges of the view beyond the farthest door
@@ -27,12 +27,13 @@ _STYLE = """
 class _Canvas:
     """Conversion of places to pixels; the robot looks up."""
 
-    def __init__(self, plan: Plan) -> None:
+    def __init__(self, plan: Plan, px_per_m: float) -> None:
+        self.px_per_m = px_per_m
         xs, ys = zip(*plan.places, *_view_arc(plan), strict=True)
         spare = max(0.0, _MIN_WIDTH_M - (max(ys) - min(ys))) / 2
         self._top, self._left = max(*xs, 0.8), max(ys) + spare
-        self.width = (max(ys) - min(ys) + 2 * spare) * _PX_PER_M + 2 * _MARGIN_PX[0]
-        self.height = (self._top - min(*xs, -0.35)) * _PX_PER_M + 2 * _MARGIN_PX[1]
+        self.width = (max(ys) - min(ys) + 2 * spare) * self.px_per_m + 2 * _MARGIN_PX[0]
+        self.height = (self._top - min(*xs, -0.35)) * self.px_per_m + 2 * _MARGIN_PX[1]
 
     def __call__(self, place: Place) -> str:
         """Return the pixels of a place, separated by a comma."""
@@ -42,17 +43,20 @@ class _Canvas:
     def pixel(self, place: Place) -> tuple[float, float]:
         """Return the pixels of a place."""
         x, y = place
-        return (self._left - y) * _PX_PER_M + _MARGIN_PX[0], (self._top - x) * _PX_PER_M + _MARGIN_PX[1]
+        return (self._left - y) * self.px_per_m + _MARGIN_PX[0], (self._top - x) * self.px_per_m + _MARGIN_PX[
+            1
+        ]
 
 
-def plan_svg(plan: Plan, title: str = "") -> str:
+def plan_svg(plan: Plan, title: str = "", px_per_m: float = PX_PER_M) -> str:
     """Return a plan as SVG; its colours follow a dark surface.
 
     Args:
         plan: plan.
         title: text above the drawing.
+        px_per_m: pixels of a metre; texts have one size, so that they are larger beside a smaller drawing.
     """
-    at = _Canvas(plan)
+    at = _Canvas(plan, px_per_m)
     parts = [
         *_view(plan, at),
         *(_line(start, end, at, "wall", 7) for start, end in plan.walls),
@@ -151,9 +155,9 @@ def _robot(at: _Canvas) -> Iterator[str]:
 
 
 def _scale(at: _Canvas) -> Iterator[str]:
-    u, v = at.width - 20 - _PX_PER_M, at.height - 18
-    yield f'<path class="ray" fill="none" stroke-width="1.5" d="M{u:.1f} {v - 4:.1f}v8m0 -4h{_PX_PER_M:g}m0 -4v8"/>'
-    yield _text((u + _PX_PER_M / 2, v - 6), "1 m", "soft", 11, "middle")
+    u, v = at.width - 20 - at.px_per_m, at.height - 18
+    yield f'<path class="ray" fill="none" stroke-width="1.5" d="M{u:.1f} {v - 4:.1f}v8m0 -4h{at.px_per_m:g}m0 -4v8"/>'
+    yield _text((u + at.px_per_m / 2, v - 6), "1 m", "soft", 11, "middle")
 
 
 def _line(start: Place, end: Place, at: _Canvas, name: str, width: float, dash: str = "") -> str:

@@ -35,6 +35,7 @@ Entry = dict[str, Any]
 `plan` and `detections`."""
 
 WHOLE_POINTS = 8000  # of the whole cloud, drawn under the points that were used
+_PLAN_PX_PER_M = 48.0  # beside the cloud
 CHANNEL_STEPS = 32  # a channel count is stored in steps of 1/32, so that two bytes hold 0 to 2047
 
 
@@ -102,7 +103,7 @@ def _plan(cloud: Points, prediction: Prediction, floor_z_m: float) -> str:
         return ""
     sample = thinned(cloud)
     level = sample if prediction.tilt is None else prediction.tilt.to_level(sample)
-    return plan_svg(make_plan(prediction, walls=plan_walls(level, floor_z_m)))
+    return plan_svg(make_plan(prediction, walls=plan_walls(level, floor_z_m)), px_per_m=_PLAN_PX_PER_M)
 
 
 def thin_for_display(cloud: Points, count: int = WHOLE_POINTS) -> Points:
