@@ -197,6 +197,7 @@ def test_pages_can_be_read_in_one_sitting() -> None:
     long_pages = {
         str(page.relative_to(ROOT)): lines
         for page in (ROOT / "docs").rglob("*.md")
-        if (lines := page.read_text(encoding="utf-8").count("\n")) > 170
+        if page.name != "commands.md"  # a table to look things up in, a line for each option
+        and (lines := page.read_text(encoding="utf-8").count("\n")) > 170
     }
     assert long_pages == {}
