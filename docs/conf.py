@@ -45,17 +45,17 @@ python_use_unqualified_type_names = True
 nitpick_ignore_regex = [
     (
         "py:.*",
-        r"(numpy|np|pandas|pd|torch|pydantic|annotated_types|collections|pathlib|typing|types|fastapi|enum|abc)\..*",
+        r"(numpy|np|pandas|pd|torch|pydantic|annotated_types|collections|pathlib|typing|types|datetime|fastapi|enum|abc)\..*",
     ),
     ("py:.*", r"doorstate\.(simulation|dataset|training|evaluation|rules\.walls)\..*"),
     (
         "py:.*",
-        r"(doorstate\.rules\.base\.)?P|Points|Indices|Floats|Columns|Quaternion|Crops|LevelingSource|Tensor|NDArray|Path|NoneType",
+        r"(doorstate\.rules\.base\.)?P|Points|Indices|Floats|Place|Columns|Quaternion|Crops|LevelingSource|Tensor|NDArray|Path|NoneType",
     ),  # type variables, and bare names in NamedTuples
     # Constraints of pydantic, and their limits.
     (
         "py:class",
-        r"FieldInfo|G[et]|L[et]|M(ax|in)Len|_PydanticGeneralMetadata|[\d.e+-]+|doorstate[\w.]*\._check_\w+",
+        r"FieldInfo|G[et]|L[et]|M(ax|in)Len|_?Pydantic\w+|[\d.e+-]+|doorstate[\w.]*\._(check|lower)\w*",
     ),
 ]
 
