@@ -11,6 +11,7 @@ import pytest
 from doorstate.dataset.frame_labels import DoorLabel, LabelIndex
 from doorstate.dataset.labelled import labelled_frames
 from doorstate.errors import CloudReadError
+from doorstate.io.bags import Bag
 from doorstate.io.camera import Intrinsics
 from doorstate.io.options import ReadOptions
 from doorstate.simulation.frames import Frame
@@ -67,6 +68,30 @@ def test_labelled_messages_of_a_bag_become_files(kind: str, tmp_path: Path) -> N
     level.close()
     with pytest.raises(CloudReadError):
         BagFrames(bag, out, ReadOptions(), topic="/other")
+
+
+def test_a_bag_is_read_once_while_frames_are_labelled(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("rosbags")
+    from tests.bag_writer import START_NS, cloud, write_bag
+
+    messages = [cloud("/points", CLOUDS[0], START_NS + k * 10**9) for k in range(20)]
+    bag = write_bag(tmp_path / "bag", "mcap", messages)
+    source = BagFrames(bag, tmp_path / "labels", ReadOptions())
+    starts: list[int] = []
+    clouds = Bag.clouds
+
+    def counted(self: Bag, *arguments: object) -> object:
+        starts.append(int(str(arguments[-1])))
+        return clouds(self, *arguments)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(Bag, "clouds", counted)
+    for number in range(5, 15):
+        source.read(number + 1)  # ahead
+        source.keep(number)
+    assert starts == [6, 5, 7]
+    source.close()
 
 
 def test_options_as_columns() -> None:

@@ -65,6 +65,13 @@ def test_labels_are_proposed_while_nothing_moves(folder: Path) -> None:
     assert session.counts() == {"closed": 2, "open": 1}
 
 
+def test_words_of_others_are_not_proposed(folder: Path) -> None:
+    (folder / "index.csv").write_text(f"file,state\n{FILES[0]},ambiguous\n", encoding="utf-8")
+    session = open_session(folder)
+    assert session.show(1)["proposed"] == []
+    assert session.show(0)["labels"] == [{"state": "ambiguous", "door": "", "place": None}]
+
+
 def test_a_new_session_goes_on_after_the_last_label(folder: Path) -> None:
     session = open_session(folder)
     assert session.start() == 0

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import io
+from collections import OrderedDict
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
@@ -24,6 +25,7 @@ from doorstate.io.readers import read_posed_cloud
 from doorstate.io.sensor_pose import PosedCloud
 
 _COLOUR_SUFFIXES = (".jpg", ".jpeg", ".png")
+_KEPT_MESSAGES = 6  # of a few MB
 TOPIC_COLUMN, STAMP_COLUMN = "topic", "stamp_s"
 
 
@@ -131,7 +133,9 @@ class BagFrames:
         ]
         self._messages: Iterator[StampedCloud] = iter(())
         self._next = -1  # number of the frame that `_messages` yields next
-        self._current: tuple[int, StampedCloud] | None = None
+        self._last: OrderedDict[int, StampedCloud] = (
+            OrderedDict()
+        )  # the next frame is read before one is labelled
 
     def close(self) -> None:
         """Close the bag."""
@@ -165,8 +169,8 @@ class BagFrames:
         return columns
 
     def _message(self, number: int) -> StampedCloud:
-        if self._current is not None and self._current[0] == number:
-            return self._current[1]
+        if number in self._last:
+            return self._last[number]
         if number != self._next:
             self._messages = self._bag.clouds(
                 self._topic, self._options, self._camera_info_topic, self._every, number * self._every
@@ -175,7 +179,9 @@ class BagFrames:
         message = next(self._messages, None)
         if message is None:
             raise CloudReadError("has fewer messages than its index tells", path=self._path)
-        self._next, self._current = number + 1, (number, message)
+        self._next, self._last[number] = number + 1, message
+        if len(self._last) > _KEPT_MESSAGES:
+            self._last.popitem(last=False)
         return message
 
 

@@ -19,7 +19,7 @@ from doorstate.dataset.frame_labels import DoorLabel, LabelIndex, Labels, Lines
 from doorstate.doorways.still_view import is_still
 from doorstate.errors import DatasetError, DoorstateError, WriteParameter, python_parameter
 from doorstate.inference.known import DoorHint
-from doorstate.types import DoorState
+from doorstate.types import LABELS, DoorState
 from doorstate.viewer.frame_sources import TOPIC_COLUMN, FrameSource
 from doorstate.viewer.label_frame import LabelFrame, encode_doorway, hint_of_box, open_frame, unreadable
 
@@ -111,11 +111,6 @@ class LabelSession:
         states = [label.state for name, each in labels if name in self._numbers for label in each]
         return dict(Counter(states).most_common())
 
-    @property
-    def changed(self) -> int:
-        """Changes that can be undone."""
-        return len(self._undo)
-
     def start(self) -> int:
         """Return the number of the first frame without a label after the last one with, or of the last frame."""
         last = max((self._numbers.get(name, -1) for name in self._index.labels()), default=-1)
@@ -148,7 +143,10 @@ class LabelSession:
             return entry | unreadable(frame, self._parameter)
         if previous is not None:
             earlier = all_labels[self._source.names[previous]]
-            if self._is_still(previous, number, earlier):
+            is_known = all(
+                label.state in LABELS for label in earlier
+            )  # other words are left to who wrote them
+            if is_known and self._is_still(previous, number, earlier):
                 entry |= {"proposed": _encode(earlier), "proposed_from": self._source.names[previous]}
         return entry | dict(frame.page)
 

@@ -142,7 +142,7 @@
     element("share").style.width = `${(100 * shown.labelled) / shown.count}%`;
     element("known").replaceChildren(...shown.doors.map((value) => make("option", { value })));
     element("plot").classList.toggle("broken", Boolean(shown.error));
-    element("accept").hidden = !shown.proposed.length;
+    for (const button of document.querySelectorAll(".accept")) button.hidden = !shown.proposed.length;
     const note = shown.error ?? (shown.note || (shown.proposed.length ? `hardly changed since ${shown.proposed_from}` : shown.labelled_before ? "labelled before" : ""));
     element("note").textContent = note;
     element("note").classList.toggle("warn", Boolean(shown.error || shown.note));
