@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import torch
 
 from doorstate.errors import ConfigError, WeightsError
-from doorstate.inference.backends import load_backend, loading
+from doorstate.inference.backends import load_backend, loading, needs_torch
 from doorstate.inference.backends.onnx_backend import OnnxBackend
 from doorstate.inference.backends.torch_backend import TorchBackend
 
@@ -47,6 +48,23 @@ def test_exported_networks_run_on_the_processor(monkeypatch: pytest.MonkeyPatch,
         with pytest.raises(ConfigError) as refused:
             load_backend(*arguments, device="cuda:1")
         assert (refused.value.field, refused.value.expected) == ("device", "cpu")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "needed"),
+    [
+        (("pointnet2",), False),
+        (("pointnet2", "torch"), True),
+        (("pointnet2", None, "cuda:1"), True),
+        (("pointnet2", None, "auto"), True),
+        (("pointnet2", "onnxruntime", "auto"), False),
+        ((Path("net.safetensors"),), True),
+        (("net.onnx", None, "auto"), False),
+        (("",), False),
+    ],
+)
+def test_torch_is_needed_for_its_files_and_for_devices(arguments: tuple[Any, ...], needed: bool) -> None:
+    assert needs_torch(*arguments) is needed
 
 
 def test_every_device_answers_as_the_processor() -> None:

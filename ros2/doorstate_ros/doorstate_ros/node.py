@@ -23,6 +23,7 @@ from std_msgs.msg import Bool, ColorRGBA, Header, String
 from visualization_msgs.msg import Marker, MarkerArray
 
 from doorstate.errors import DoorstateError
+from doorstate.inference.backends import needs_torch
 from doorstate.inference.backends.threads import configure_torch
 from doorstate.inference.door_report import UNKNOWN, DoorPose, DoorReport
 from doorstate.inference.watch import DoorWatch
@@ -56,7 +57,7 @@ class DoorNode:
     def __init__(self, node: Node) -> None:
         self._node = node
         settings = declare_settings(node)
-        configure_torch(settings.threads or None, used=settings.weights.endswith(".safetensors"))
+        configure_torch(settings.threads or None, used=needs_torch(settings.weights))
         self._watch = DoorWatch(settings)
         self._state = node.create_publisher(String, "~/state", LATCHED)
         self._open = node.create_publisher(Bool, "~/open", LATCHED)

@@ -57,25 +57,29 @@ def load_predictors(
 ) -> dict[str, Predictor]:
     """Load and warm up the networks and rules by name; the default network if none is named.
 
-    Points and time budget are those of the networks; beside networks, rules use all points. The device is
-    that of the networks. With `for_view` torch runs
-    packaged networks where it is installed, because only torch shows which points decided.
+    Points and time budget are those of the networks; beside networks, rules use all points. The device is that of the
+    networks. With `for_view` torch runs packaged networks where it is installed, because only torch shows which points
+    decided.
 
     Raises:
         ConfigError: options exclude each other.
         DoorstateError: see `Predictor.load`.
     """
     from doorstate.cli.progress import working
+    from doorstate.inference.backends import needs_torch
     from doorstate.inference.backends.threads import configure_torch
     from doorstate.inference.predictor import Predictor
 
     choices = methods.choices()
-    mixed = any(choice is not None for choice in choices.values())
-    uses_torch = device != "cpu" or any(path.suffix == ".safetensors" for path in methods.weights or ())
-    configure_torch(threads, used=uses_torch)
+    backends = {
+        name: "torch" if isinstance(choice, str) and for_view and is_installed("torch") else None
+        for name, choice in choices.items()
+    }
+    networks = [(choice, backends[name]) for name, choice in choices.items() if choice is not None]
+    configure_torch(threads, used=any(needs_torch(*network, device) for network in networks))
     predictors = {}
     for name, choice in choices.items():
-        is_plain = choice is None and mixed
+        is_plain = choice is None and bool(networks)
         with working(f"Loading {name}"):
             predictor = Predictor.load(
                 choice,
@@ -84,7 +88,7 @@ def load_predictors(
                 budget_ms=None if is_plain else budget_ms,
                 threads=threads,
                 device=device,
-                backend="torch" if isinstance(choice, str) and for_view and is_installed("torch") else None,
+                backend=backends[name],
             )
             predictor.warm_up()
         _warn_about_points(name, predictor, points)

@@ -137,8 +137,9 @@ def _loader(methods: Methods, points: int | None, budget_ms: float | None, threa
 def _load_in_worker(
     choice: Path | str | None, rule: str | None, points: int | None, threads: int
 ) -> Predictor:
+    from doorstate.inference.backends import needs_torch
     from doorstate.inference.backends.threads import configure_torch
     from doorstate.inference.predictor import Predictor
 
-    configure_torch(threads, used=isinstance(choice, Path) and choice.suffix == ".safetensors")
+    configure_torch(threads, used=choice is not None and needs_torch(choice))
     return Predictor.load(choice, rule=rule, num_points=points, threads=threads)

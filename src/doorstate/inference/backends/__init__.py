@@ -4,6 +4,6 @@
 from __future__ import annotations
 
 from doorstate.inference.backends.base import Backend, CloudOutputs, Outputs, run_by_size
-from doorstate.inference.backends.loading import load_backend
+from doorstate.inference.backends.loading import load_backend, needs_torch
 
-__all__ = ["Backend", "CloudOutputs", "Outputs", "load_backend", "run_by_size"]
+__all__ = ["Backend", "CloudOutputs", "Outputs", "load_backend", "needs_torch", "run_by_size"]

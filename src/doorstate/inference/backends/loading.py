@@ -14,6 +14,13 @@ from doorstate.networks.packaged import packaged_graph, packaged_weights
 BACKENDS = ("onnxruntime", "torch")
 
 
+def needs_torch(name_or_path: str | Path, backend: str | None = None, device: str = "cpu") -> bool:
+    """Return True if `load_backend` imports torch for this network, or looks for a CUDA device; imports nothing."""
+    path = Path(name_or_path)
+    is_named = path.suffix == ".safetensors" or backend == "torch" or device != "cpu"
+    return is_named and _can_be_torch(path, backend)
+
+
 def load_backend(
     name_or_path: str | Path, threads: int | None = None, backend: str | None = None, device: str = "cpu"
 ) -> Backend:
@@ -33,8 +40,7 @@ def load_backend(
     if backend not in (None, *BACKENDS):
         raise unknown_name("backend", str(backend), BACKENDS, field="backend")
     path = Path(name_or_path)
-    can_be_torch = path.suffix != ".onnx" and backend != "onnxruntime"
-    place = _torch_device(device, can_be_torch)
+    place = _torch_device(device, _can_be_torch(path, backend))
     if place != "cpu":
         backend = "torch"
     if path.suffix == ".onnx":
@@ -51,6 +57,10 @@ def load_backend(
     if backend == "torch":
         return _load_torch(packaged_weights(name), place)
     return OnnxBackend(packaged_graph(name), threads, weights=packaged_weights(name))
+
+
+def _can_be_torch(path: Path, backend: str | None) -> bool:
+    return path.suffix != ".onnx" and backend != "onnxruntime"
 
 
 def _torch_device(device: str, can_be_torch: bool) -> str:
