@@ -28,6 +28,7 @@ from doorstate.simulation.presets import PRESETS, draw_rows
 from doorstate.simulation.settings import SimulationSettings
 from doorstate.simulation.writer import simulate_dataset
 
+pytest_plugins = ["tests._jobs.engines"]
 SMALL_POINTS = 160
 Run = Callable[..., tuple[int, str, str]]
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from matplotlib.figure import Figure
 
-from doorstate.evaluation.figures.encode import encode_figures
+from doorstate.evaluation.figures.encode import encode_figure
 from doorstate.evaluation.results import Results
 
 from ..published import side_by_side
@@ -21,4 +21,6 @@ def draw(experiment: str, name: str, draw_figure: Callable[[Results], Figure | N
         name: file of the figure in the report, without its suffix.
         draw_figure: function that draws it.
     """
-    return encode_figures({name: draw_figure(side_by_side(experiment))})[name]
+    figure = draw_figure(side_by_side(experiment))
+    assert figure is not None
+    return encode_figure(name, figure)

@@ -22,7 +22,7 @@ from doorstate.simulation.settings import SimulationSettings
 from doorstate.simulation.writer import simulate_dataset
 from doorstate.training.comparison import compare
 from doorstate.training.experiment import Experiment
-from tests._jobs.conftest import TwoMachines
+from tests._jobs.engines import TwoMachines
 from tests.training.runs import read_results, small_experiment
 
 ONE = Resources(cpus=1)

@@ -37,14 +37,6 @@ if __name__ == "__main__":
 """
 
 
-@pytest.fixture(params=["this process", "processes", "ray"])
-def engine(request: pytest.FixtureRequest) -> Engine:
-    """Every engine, the first two with an own contract for a killed process."""
-    if request.param == "ray":
-        return request.getfixturevalue("ray_engine")
-    return ProcessEngine(1 if request.param == "this process" else 2)
-
-
 def test_only_missing_pieces_are_run(tmp_path: Path, engine: Engine) -> None:
     paths = piece_paths(tmp_path, 5, ".txt")
     assert paths[4] == tmp_path / "00004.txt"

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import secrets
 import signal
 import time
 from pathlib import Path
@@ -46,4 +47,20 @@ def slow(piece: float, path: Path) -> None:
 
 def gpus(piece: int, path: Path) -> None:
     time.sleep(0.2)  # so that every worker gets one
-    write_text(path, os.environ.get("CUDA_VISIBLE_DEVICES", "all"))
+    write_text(path, visible_gpus(None, piece))
+
+
+def visible_gpus(_: object, piece: int) -> str:
+    return os.environ.get("CUDA_VISIBLE_DEVICES", "all")
+
+
+def load_offset(offset: int, folder: Path) -> int:
+    """Leaves a file for each call."""
+    if not folder.is_dir():
+        raise DatasetError("no folder", path=folder)
+    folder.joinpath(secrets.token_hex(8)).touch()
+    return offset
+
+
+def plus_offset(offset: int, piece: int) -> tuple[int, int]:
+    return piece, piece + offset

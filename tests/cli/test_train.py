@@ -30,7 +30,7 @@ def test_pipeline_from_simulation_to_report(run: Run, tmp_path: Path) -> None:
     assert (runs / "report" / "report.html").is_file()
     assert run("report", runs / "runs" / "pointnet2" / "fold0", "--out", tmp_path / "one")[0] == 0
     assert (tmp_path / "one" / "report.html").is_file()
-    assert run("report", clouds, "--out", tmp_path / "data-report")[0] == 0
+    assert run("report", clouds, "--out", tmp_path / "data-report", "--workers", 2)[0] == 0
     trained = runs / "runs" / "pointnet2" / "fold0" / "weights.safetensors"
     depth = sorted((simulated / "depth" / "open").glob("*.png"))[0]
     camera = ("--fx", 554.256258, "--fy", 554.256258, "--cx", 319.5, "--cy", 239.5)
@@ -93,7 +93,7 @@ def test_resolution_measures_once(run: Run, simulated_folder: Path, tmp_path: Pa
         '[fine_tuning]\nepochs = 1\nbatch_size = 8\nprecision = "fp32"\n'
     )
     folder = tmp_path / "out"
-    code, _, err = run("resolution", study, "--out", folder)
+    code, _, err = run("resolution", study, "--out", folder, "--device", "cpu")
     assert code == 0, err
     assert [row["points"] for row in read_csv(folder / "latency.csv")] == ["128", "256"]
     assert (folder / "report" / "figures" / "resolution.png").is_file()
@@ -113,7 +113,7 @@ def test_transfer_tests_on_another_data_set(run: Run, small_dataset: PreparedDat
         f'networks = ["pointnet"]\nnum_points = 128\n[trained]\nhere = "{runs}"\n'
         f'[tested]\nthere = "{small_dataset.folder}"\n'
     )
-    code, out, err = run("transfer", study, "--out", folder)
+    code, out, err = run("transfer", study, "--out", folder, "--device", "cpu")
     assert code == 0, err
     assert any("here" in line and "pointnet" in line for line in out.splitlines())
     assert (folder / "report" / "figures" / "transfer.png").is_file()

@@ -14,6 +14,7 @@ from doorstate._files import write_csv
 from doorstate.dataset.splits import draw_splits, write_splits
 from doorstate.dataset.store import PreparedDataset
 from doorstate.evaluation.factors import score_kinds
+from doorstate.evaluation.gallery import build_gallery
 from doorstate.evaluation.head_tables import head_tables
 from doorstate.evaluation.heads import (
     head_errors,
@@ -26,6 +27,7 @@ from doorstate.evaluation.heads import (
 )
 from doorstate.evaluation.predictions import load_results
 from doorstate.evaluation.report import render_report
+from doorstate.evaluation.report_parts import ReportParts
 from doorstate.evaluation.results import Results
 from doorstate.evaluation.rule_outputs import score_angles
 from doorstate.evaluation.tables import build_tables
@@ -167,7 +169,8 @@ def test_angles_and_kinds_of_networks_are_scored(results: Results) -> None:
 
 
 def test_report_shows_the_tables_of_heads(results: Results, scene_dataset: PreparedDataset) -> None:
-    page = render_report(results, scene_dataset, build_tables(results), {})
+    parts = ReportParts(build_tables(results), {}, build_gallery(results, scene_dataset))
+    page = render_report(results, scene_dataset, parts)
     for name in ("head_errors", "four_labels", "presence", "parts", "kinds"):
         assert f'<figure class="table" id="{name}">' in page, name
 

@@ -8,9 +8,12 @@ import re
 from html.parser import HTMLParser
 from pathlib import Path
 
+from doorstate._jobs import RayEngine
 from doorstate.dataset.store import PreparedDataset
+from doorstate.evaluation.gallery import build_gallery
 from doorstate.evaluation.predictions import load_results
 from doorstate.evaluation.report import render_report, write_dataset_report, write_report
+from doorstate.evaluation.report_parts import ReportParts
 from doorstate.evaluation.tables import build_tables
 from tests.evaluation.conftest import MakeComparison
 
@@ -58,17 +61,21 @@ class Page(HTMLParser):
 
 def _render(results_folder: Path, dataset: PreparedDataset) -> Page:
     results = load_results(results_folder)
-    return Page(render_report(results, dataset, build_tables(results), {}))
+    parts = ReportParts(build_tables(results), {}, build_gallery(results, dataset))
+    return Page(render_report(results, dataset, parts))
 
 
-def test_everything_is_written_self_contained_and_the_same_twice(
+def test_everything_is_written_self_contained_and_the_same_by_two_processes(
     simulated: PreparedDataset, make_comparison: MakeComparison, tmp_path: Path
 ) -> None:
     ids = [row["sample_id"] for row in simulated.rows]
     wrong = {"pointnet": {ids[2]: "semi_open", ids[7]: "open"}, "dgcnn": {ids[2]: "semi_open"}}
     folder = make_comparison(simulated, wrong)
     report = write_report([folder], tmp_path / "one")
-    write_report([folder], tmp_path / "two")
+    steps: list[tuple[int, int]] = []
+    write_report([folder], tmp_path / "two", workers=2, progress=lambda *step: steps.append(step))
+    assert steps[-1] == (12, 12)
+    assert not list((tmp_path / "two").glob(".*"))
     files = sorted(path.relative_to(tmp_path / "one") for path in (tmp_path / "one").rglob("*.*"))
     assert {str(path.parent) for path in files} == {".", "tables", "figures"}
     for path in files:
@@ -114,6 +121,15 @@ def test_a_data_set_alone(imported: PreparedDataset, tmp_path: Path) -> None:
     found = {str(path.relative_to(out)) for path in out.rglob("*.*")}
     tables = {f"tables/{name}.csv" for name in ("table1_samples", "undecidable_frames")}
     assert found == tables | {"figures/figure2_samples.png"}
+
+
+def test_ray_draws_the_same_bytes(imported: PreparedDataset, ray_engine: RayEngine, tmp_path: Path) -> None:
+    alone, out = tmp_path / "alone", tmp_path / "out"
+    write_dataset_report(imported.folder, alone)
+    write_dataset_report(imported.folder, out, ray_engine)
+    files = [path.relative_to(alone) for path in alone.rglob("*.*")]
+    assert len(files) == 3
+    assert all((alone / path).read_bytes() == (out / path).read_bytes() for path in files)
 
 
 def test_without_errors(simulated: PreparedDataset, make_comparison: MakeComparison) -> None:

@@ -14,7 +14,6 @@ from doorstate.cli.options import (
     AsJson,
     Changes,
     ComparedNetworks,
-    Device,
     Epochs,
     HeadNames,
     Protocol,
@@ -48,7 +47,6 @@ def compare(
     epochs: Epochs = None,
     head: HeadNames = None,
     changes: Changes = None,
-    device: Device = "auto",
     as_json: AsJson = False,
     *,
     runs: EngineOptions,
@@ -88,7 +86,7 @@ def compare(
     settings = load_experiment(experiment, overrides | {"recipe_changes": changed})
     folder = out or Path("runs") / settings.name
     with runs.open() as engine:
-        metrics = compare_with_display(settings, folder, engine, runs.resources, device)
+        metrics = compare_with_display(settings, folder, engine, runs.resources, runs.device)
     if as_json:
         for run in metrics:
             print_json(run)

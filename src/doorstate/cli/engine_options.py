@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Options of where the pieces of a command run, and of what each training gets."""
+"""Options of where the pieces of a command run, and of what each of them gets."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 import typer
 
 from doorstate.cli.choices import ENGINE
+from doorstate.cli.options import Device
 from doorstate.cli.shared_options import with_shared_options
 from doorstate.errors import ConfigError
 
@@ -34,7 +35,14 @@ _Address = Annotated[
 ]
 _Workers = Annotated[
     int | None,
-    typer.Option(help="Worker processes. [default: one a processor; in evaluate, this one]", min=1),
+    typer.Option(
+        help="Worker processes. [default: one a processor; in evaluate and report without --engine ray, this one]",
+        min=1,
+    ),
+]
+Gpus = Annotated[
+    float | None,
+    typer.Option(help="GPUs of each run, or of each worker of evaluate; 0.25 lets four share one.", min=0),
 ]
 
 
@@ -45,11 +53,31 @@ class EngineOptions(NamedTuple):
     address: str | None
     workers: int | None
     resources: Resources | None = None  # of each piece
+    device: str = "cpu"  # of the networks of a piece
+
+    @property
+    def is_default(self) -> bool:
+        """True if the user asks for no engine: a command may then work in its own process."""
+        return self.name == "processes" and self.workers is None and self.resources is None
 
     @property
     def is_cluster(self) -> bool:
         """True if other machines may take part."""
         return self.name == "ray" and bool(self.address or os.environ.get("RAY_ADDRESS"))
+
+    def on_device(self, device: str, resources: Resources | None) -> EngineOptions:
+        """Return the engine for networks on a device.
+
+        Raises:
+            ConfigError: Ray would hide the device.
+        """
+        if self.name == "ray" and device.startswith("cuda") and not (resources and resources.gpus):
+            raise ConfigError(
+                "the engine ray hides GPUs from work that asks for none",
+                field="device",
+                suggestions={"gpus": 1},
+            )
+        return self._replace(resources=resources, device=device)
 
     @contextmanager
     def open(self) -> Iterator[Engine]:
@@ -93,30 +121,31 @@ def runs_options(
     jobs: Annotated[
         int | None,
         typer.Option(
-            help="Number of runs at the same time. [default: 1; with --engine ray or --cpus, as many as fit]",
+            help="Number of runs at the same time."
+            " [default: 1; with --engine ray, --cpus, --gpus or --memory-gib, as many as fit]",
             min=1,
         ),
     ] = None,
     cpus: Annotated[
         int | None,
         typer.Option(
-            help="Processors, and so threads, of each run. [default: an equal share; with --engine ray, 1]",
+            help="Processors, and so threads, of each run."
+            " [default: an equal share; with --engine ray, --gpus or --memory-gib, 1]",
             min=1,
         ),
     ] = None,
-    gpus: Annotated[
-        float | None, typer.Option(help="GPUs of each run; 0.25 lets four share one.", min=0)
-    ] = None,
+    gpus: Gpus = None,
     memory_gib: Annotated[
         float | None, typer.Option(help="Main memory of each run in GiB. [default: not counted]", min=0)
     ] = None,
+    device: Device = "auto",
     engine: _EngineName = "processes",
     address: _Address = None,
 ) -> EngineOptions:
-    """Return the engine of a command that trains, and the resources of each run.
+    """Return the engine of a command that trains, and resources and device of each run.
 
     Raises:
-        ConfigError: an address of no cluster, or impossible resources.
+        ConfigError: an address of no cluster, impossible resources, or a device that Ray would hide.
     """
     from doorstate._jobs import Resources
 
@@ -125,7 +154,7 @@ def runs_options(
         resources = Resources(cpus or 1, gpus or 0.0, int((memory_gib or 0) * 2**30))
     elif engine == "processes":
         jobs = jobs or 1
-    return engine_options(jobs, engine, address)._replace(resources=resources)
+    return engine_options(jobs, engine, address).on_device(device, resources)
 
 
 with_engine_options = with_shared_options(engine_options, "engine")

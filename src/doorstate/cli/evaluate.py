@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from doorstate.cli.engine_options import EngineOptions, with_engine_options
+from doorstate.cli.engine_options import EngineOptions, Gpus, with_engine_options
 from doorstate.cli.options import (
     AsJson,
     BudgetMs,
@@ -45,6 +45,7 @@ def evaluate(
     budget_ms: BudgetMs = None,
     threads: Threads = None,
     device: Device = "cpu",
+    gpus: Gpus = None,
     group: Annotated[
         str | None,
         typer.Option(
@@ -94,6 +95,7 @@ def evaluate(
       doorstate evaluate DeepDoors2 --layout deepdoors2 --weights mine.safetensors --by split --json
     """
     from doorstate._files import check_writable
+    from doorstate._jobs import Resources
     from doorstate._locks import owned_folder
     from doorstate.cli.console import print_json, stderr
     from doorstate.cli.evaluate_output import PAGE, print_scores, write_frame_report
@@ -109,6 +111,7 @@ def evaluate(
     shown = _shown_frames(all_frames, changed, out, len(methods.choices()))
     if engine.is_cluster and out is None:
         raise ConfigError("machines of a cluster need a folder that they share", field="out")
+    engine = engine.on_device(device, Resources(gpus=gpus) if gpus else None)
     check_layout(layout, options)
     frames = labelled_frames(folder, options, layout)
     group = group or default_group(frames)
@@ -118,13 +121,15 @@ def evaluate(
         check_writable(out / PAGE)
     with nullcontext() if out is None else owned_folder(out):
         predictors = load_predictors(methods, points, budget_ms=budget_ms, threads=threads, device=device)
-        if engine.name == "processes" and engine.workers is None:
+        if engine.is_default:
             with progress_bar("Predicting") as progress:
                 results = evaluate_frames(predictors, frames, progress)
         else:
             arguments = arguments_of(predictors, methods, threads, device)
             with engine.open() as workers, progress_bar("Predicting") as progress:
-                results = evaluate_frames_in_pieces(arguments, frames, workers, out, progress)
+                results = evaluate_frames_in_pieces(
+                    arguments, frames, workers, out, progress, engine.resources
+                )
         print_errors([(frame.file, reason) for frame, reason in results.unreadable], "file")
         if not results.frames:
             raise CloudReadError(f"none of {len(frames)} files could be read", path=folder)

@@ -3,14 +3,17 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from doorstate.cli.engine_options import EngineOptions, with_engine_options
 from doorstate.errors import DatasetError
 
 
+@with_engine_options
 def report(
     folders: Annotated[
         list[Path],
@@ -24,6 +27,8 @@ def report(
     data: Annotated[
         Path | None, typer.Option(help="Data set of the comparisons or runs, if it was moved.")
     ] = None,
+    *,
+    engine: EngineOptions,
 ) -> None:
     """Write a report of comparisons, of one run, or of one data set.
 
@@ -37,7 +42,7 @@ def report(
       doorstate report data/ogurob-4096 --out reports/data
     """
     from doorstate.cli.console import stdout
-    from doorstate.cli.progress import working
+    from doorstate.cli.progress import progress_bar
     from doorstate.dataset.store import is_prepared
     from doorstate.evaluation.predictions import has_results
     from doorstate.evaluation.report import write_dataset_report, write_report
@@ -46,6 +51,10 @@ def report(
     if is_dataset and not is_prepared(folders[0]):
         raise DatasetError("no comparison, no run and no prepared data set", path=folders[0])
     target = out or folders[0] / "report"
-    with working("Writing the report"):
-        page = write_dataset_report(folders[0], target) if is_dataset else write_report(folders, target, data)
+    opened = nullcontext(1) if engine.is_default else engine.open()
+    with opened as workers, progress_bar("Writing the report") as progress:
+        if is_dataset:
+            page = write_dataset_report(folders[0], target, workers, progress)
+        else:
+            page = write_report(folders, target, data, workers=workers, progress=progress)
     stdout.print(f"report: {page}")

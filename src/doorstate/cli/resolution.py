@@ -25,9 +25,9 @@ def resolution(
 ) -> None:
     """Test trained networks with fewer points.
 
-    Measures accuracy and time. A study file has the keys dataset, start_from (a finished comparison) and points (a
-    list). Optional keys are protocol, networks, folds, seed and heads (as in the comparison) and the table
-    [fine_tuning] with fields of a recipe. An interrupted study continues where it stopped.
+    Measures accuracy, and the time on the processor of this machine. A study file has the keys dataset, start_from (a
+    finished comparison) and points (a list). Optional keys are protocol, networks, folds, seed and heads (as in the
+    comparison) and the table [fine_tuning] with fields of a recipe. An interrupted study continues where it stopped.
 
     \b
     Examples:
@@ -47,7 +47,7 @@ def resolution(
     parts = list(settings.parts())
     with owned_folder(folder), runs.open() as engine:
         for part in parts:
-            compare_with_display(part.experiment, folder / part.folder, engine, runs.resources)
+            compare_with_display(part.experiment, folder / part.folder, engine, runs.resources, runs.device)
         if not (folder / LATENCY).is_file():
             _measure_latency(settings, folder)
     results = load_study_results(folder)

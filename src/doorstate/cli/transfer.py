@@ -43,7 +43,7 @@ def transfer(
     with owned_folder(folder), runs.open() as engine:
         settings.prepare(folder)
         for part in parts:
-            compare_with_display(part.experiment, folder / part.folder, engine, runs.resources)
+            compare_with_display(part.experiment, folder / part.folder, engine, runs.resources, runs.device)
     results = load_study_results(folder)
     scores = score_transfer(results, tuple(settings.trained), tuple(settings.tested))
     table = transfer_table(scores)

@@ -4,27 +4,26 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from doorstate._files import write_text
+from doorstate._files import check_writable, write_text
+from doorstate._jobs import Progress, WorkersOrEngine, no_progress
 from doorstate._locks import owned_folder
 from doorstate.dataset.store import PreparedDataset, open_dataset
 from doorstate.evaluation.caveats import PROTOCOLS, caveats
-from doorstate.evaluation.figures.draw import draw_dataset_figures, draw_figures
 from doorstate.evaluation.figures.encode import save_figures
-from doorstate.evaluation.gallery import build_gallery
 from doorstate.evaluation.manifest import manifest_frame
 from doorstate.evaluation.method_scores import predicted_labels
 from doorstate.evaluation.metrics import confusion, ratio
 from doorstate.evaluation.predictions import join_results, load_results
+from doorstate.evaluation.report_parts import ReportParts, build_parts, draw_dataset_figures
 from doorstate.evaluation.results import Results
 from doorstate.evaluation.stratum_tables import dataset_tables
-from doorstate.evaluation.table import Table
-from doorstate.evaluation.tables import build_tables, save_tables
+from doorstate.evaluation.tables import save_tables
 from doorstate.pages.colors import DETECTION_COLORS, STATE_COLORS, STATE_WORDS
 from doorstate.pages.encoding import data_uri
 from doorstate.pages.render import render_page
@@ -36,6 +35,8 @@ def write_report(
     out: Path,
     dataset: Path | None = None,
     folds: int | None = None,
+    workers: WorkersOrEngine = 1,
+    progress: Progress = no_progress,
 ) -> Path:
     """Write `tables/`, `figures/` and `report.html`; the same inputs give the same bytes.
 
@@ -44,6 +45,8 @@ def write_report(
         out: folder of the report, made if absent.
         dataset: data set folder, if it was moved.
         folds: number of first folds to show; all if not given.
+        workers: number of processes that draw, None for one a processor, or an engine.
+        progress: called with parts done and parts in all.
 
     Returns:
         Path of the page.
@@ -54,27 +57,33 @@ def write_report(
         FolderInUseError: another process writes to `out`.
     """
     results = join_results([load_results(folder, dataset, folds) for folder in folders])
-    return write_results_report(results, out)
+    return write_results_report(results, out, workers, progress)
 
 
-def write_results_report(results: Results, out: Path) -> Path:
+def write_results_report(
+    results: Results, out: Path, workers: WorkersOrEngine = 1, progress: Progress = no_progress
+) -> Path:
     """Write the report of loaded results as `write_report` does."""
+    page = out / "report.html"
+    check_writable(page)
     with owned_folder(out):
         prepared = open_dataset(results.dataset_folder)
-        tables, figures = build_tables(results), draw_figures(results, prepared)
-        save_tables(tables, out / "tables")
-        save_figures(figures, out / "figures")
-        page = out / "report.html"
-        write_text(page, render_report(results, prepared, tables, figures))
+        parts = build_parts(results, workers, out, progress)
+        save_tables(parts.tables, out / "tables")
+        save_figures(parts.figures, out / "figures")
+        write_text(page, render_report(results, prepared, parts))
     return page
 
 
-def write_dataset_report(dataset: Path, out: Path) -> Path:
+def write_dataset_report(
+    dataset: Path, out: Path, workers: WorkersOrEngine = 1, progress: Progress = no_progress
+) -> Path:
     """Write the tables and figures of a prepared data set alone: Table 1, undecidable frames, Figures 1 and 2.
 
     Args:
         dataset: prepared data set.
         out: folder for `tables/` and `figures/`, made if absent.
+        workers, progress: as for `write_report`.
 
     Returns:
         `out`.
@@ -86,22 +95,18 @@ def write_dataset_report(dataset: Path, out: Path) -> Path:
     prepared = open_dataset(dataset)
     with owned_folder(out):
         save_tables(dataset_tables(manifest_frame(prepared.rows)), out / "tables")
-        save_figures(draw_dataset_figures(prepared), out / "figures")
+        save_figures(draw_dataset_figures(prepared, workers, out, progress), out / "figures")
     return out
 
 
-def render_report(
-    results: Results, dataset: PreparedDataset, tables: Mapping[str, Table], figures: Mapping[str, bytes]
-) -> str:
+def render_report(results: Results, dataset: PreparedDataset, parts: ReportParts) -> str:
     """Fill the template of the page.
 
     Args:
         results: a checked comparison.
         dataset: data set of the comparison.
-        tables: output of `build_tables`.
-        figures: output of `draw_figures`.
+        parts: output of `build_parts`.
     """
-    gallery = build_gallery(results, dataset)
     return render_page(
         "report.html.j2",
         "doorstate.evaluation",
@@ -112,16 +117,16 @@ def render_report(
         caveats=caveats(results, dataset.description.left_out),
         facts=_facts(results, dataset),
         environment=_environment(results),
-        tables=tables,
-        figures={name: data_uri(png, "image/png") for name, png in figures.items()},
+        tables=parts.tables,
+        figures={name: data_uri(png, "image/png") for name, png in parts.figures.items()},
         confusions=[(method, _confusion_cells(results, method)) for method in results.methods],
         states=STATES,
         words=STATE_WORDS,
         labels=predicted_labels(results),
         state_colors=STATE_COLORS,
         detection_colors=DETECTION_COLORS,
-        gallery=gallery,
-        page_data={"clouds": gallery.clouds, "detections": gallery.detections},
+        gallery=parts.gallery,
+        page_data={"clouds": parts.gallery.clouds, "detections": parts.gallery.detections},
     )
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from doorstate.errors import RunError
-from doorstate.evaluation.figures.encode import encode_figures, save_figures
+from doorstate.evaluation.figures.encode import encode_figure, save_figures
 from doorstate.evaluation.figures.resolution import resolution_figure
 from doorstate.evaluation.metrics import macro_f1
 from doorstate.evaluation.study import StudyResults
@@ -114,5 +114,5 @@ def write_resolution(study: StudyResults, out: Path) -> Path:
     """Write the table and the figure of a study into `tables/` and `figures/` of a folder, made if absent."""
     scores = score_resolution(study)
     save_tables({"resolution": resolution_table(scores)}, out / "tables")
-    save_figures(encode_figures({"resolution": resolution_figure(scores)}), out / "figures")
+    save_figures({"resolution": encode_figure("resolution", resolution_figure(scores))}, out / "figures")
     return out

@@ -9,7 +9,7 @@ from pathlib import Path
 import pandas as pd
 
 from doorstate.errors import RunError
-from doorstate.evaluation.figures.encode import encode_figures, save_figures
+from doorstate.evaluation.figures.encode import encode_figure, save_figures
 from doorstate.evaluation.figures.transfer import transfer_figure
 from doorstate.evaluation.metrics import macro_f1
 from doorstate.evaluation.study import StudyResults
@@ -77,5 +77,5 @@ def write_transfer(scores: pd.DataFrame, out: Path) -> Path:
     """Write the table and the figure of a study into `tables/` and `figures/` of a folder, made if absent."""
     save_tables({"transfer": transfer_table(scores)}, out / "tables")
     figure = transfer_figure(transfer_grid(scores))
-    save_figures(encode_figures({"transfer": figure}), out / "figures")
+    save_figures({"transfer": encode_figure("transfer", figure)}, out / "figures")
     return out

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A cluster of two machines with one processor each, both simulated on this machine."""
+"""Every engine, and a cluster of two machines with one processor each, both simulated on this machine."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from unittest.mock import patch
 
 import pytest
 
-from doorstate._jobs import RayEngine
+from doorstate._jobs import Engine, ProcessEngine, RayEngine
 
 _OBJECT_STORE_BYTES = 80 * 2**20
 # A lost machine is noticed within a second.
@@ -82,3 +82,11 @@ def ray_engine(cluster: TwoMachines) -> Iterator[RayEngine]:
     assert "RAY_ADDRESS" not in os.environ
     with RayEngine(cluster.address) as engine:
         yield engine
+
+
+@pytest.fixture(params=["this process", "processes", "ray"])
+def engine(request: pytest.FixtureRequest) -> Engine:
+    """Every engine, the first two with an own contract for a killed process."""
+    if request.param == "ray":
+        return request.getfixturevalue("ray_engine")
+    return ProcessEngine(1 if request.param == "this process" else 2)
