@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from doorstate.doors.camera_place import CameraPlace
-from doorstate.doors.matching import GATE, MARGIN, Match, _options, expected_door, match_doors
+from doorstate.doors.matching import GATE, MARGIN, Match, _options, _pairs, expected_door, match_doors
 from doorstate.doors.named_door import NamedDoor
 from doorstate.doors.plane_pose import PlanePose
 from doorstate.inference.door import Door
@@ -99,6 +99,26 @@ def test_the_search_finds_what_all_hypotheses_give(
     if close or (len(ordered) > 1 and ordered[1] - ordered[0] < 1e-6):
         return
     assert match_doors(doors, list_, camera) == plain_matches(costs, len(doors))
+
+
+@given(
+    place,
+    st.lists(st.tuples(st.floats(-9, 9), st.floats(-9, 9), st.floats(-180, 180)), max_size=6),
+    st.floats(0, 2),
+)
+def test_doors_that_are_left_out_for_their_distance_could_not_match(
+    seen_place: tuple[float, float, float], list_places: list[tuple[float, float, float]], error_m: float
+) -> None:
+    camera = AT_ORIGIN._replace(position_error_m=error_m, yaw_error_deg=20.0)
+    door = seen(*seen_place)
+    list_ = [named(f"d{number}", *place) for number, place in enumerate(list_places)]
+    kept = {pair.number for pair in _pairs(door, list_, camera)}
+    for number in set(range(len(list_))) - kept:
+        x_m, y_m, _ = expected_door(list_[number], camera)
+        away = np.array([x_m, y_m]) / math.hypot(x_m, y_m)
+        radial_m = float(np.array([door.x_m, door.y_m]) @ away) - math.hypot(x_m, y_m)
+        spread = (1.5 * 0.06) ** 2 + 0.05**2 + (0.0 if list_[number].is_front(0, 0) else 0.1) ** 2
+        assert radial_m**2 / (spread + max(error_m, 0.01) ** 2) >= GATE * (1 - 1e-9)
 
 
 def test_neighbours_are_told_apart() -> None:

@@ -17,6 +17,7 @@ from doorstate.inference.door import Door
 from doorstate.inference.known import DoorHint
 from doorstate.inference.prediction import Prediction
 from doorstate.inference.serialization import prediction_to_dict
+from doorstate.inference.tilt import Tilt
 from doorstate.types import DoorState
 from tests.doors.examples import AT_ORIGIN, named, seen
 
@@ -172,6 +173,9 @@ def test_the_view_is_that_of_the_measured_points() -> None:
     points[::7] = np.nan
     view = View.of(points.reshape(50, 100, 3))
     assert (view.right_deg, view.left_deg) == (pytest.approx(-20, abs=0.6), pytest.approx(30, abs=0.6))
+    tilt = Tilt(0.0, 40.0, "floor")
+    down = tilt.from_level(points).astype(np.float32)
+    assert View.of(down, tilt).left_deg == pytest.approx(view.left_deg, abs=0.01)
     assert why_hidden((3.0, 0.0, 90.0), view) is None
     assert why_hidden((3.0, -2.0, 90.0), view) == ("out_of_view", "")
     assert why_hidden((0.1, 3.0, 90.0), View.of(points[:0])) == ("out_of_view", "")

@@ -76,6 +76,8 @@ def test_doors_of_a_tilted_cloud_are_drawn_over_the_level_one(monkeypatch: pytes
     assert whole[:, 2].min() >= FLOOR_M - 0.001
     assert decoded(entry["cloud"]["points"], "<i2").size == 3 * 3 * 128
     assert "channels" not in entry
+    assert entry["plan"].startswith("<svg")
+    assert "open 90°" in entry["plan"]
     assert [door["state"] for door in entry["prediction"]["doors"]] == ["open", "closed"]
     assert entry["prediction"]["tilt"]["pitch_deg"] == pytest.approx(20.0)
 

@@ -13,10 +13,14 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from doorstate.inference.door import Door
+from doorstate.inference.prediction import Prediction
 from doorstate.inference.predictor import Predictor
 from doorstate.inference.rule_predictor import RulePredictor
 from doorstate.pages.colors import PART_COLORS
-from doorstate.types import Part
+from doorstate.pages.plan import make_plan
+from doorstate.pages.plan_svg import plan_svg
+from doorstate.types import DoorState, Part
 from doorstate.viewer.cloud_page import Entry, make_entry, render_cloud_page
 from doorstate.viewer.live_page import LivePage
 from doorstate.viewer.named_clouds import NamedCloud
@@ -168,4 +172,20 @@ def test_live_page_follows_until_the_user_goes_back(
         wait_for_text(page, "#name", "broken.pcd")
         live.publish("end", None)
         wait_for_text(page, "#connection", "ended")
+    assert errors == []
+
+
+def test_the_plan_of_the_doors_is_shown_where_there_are_doors(
+    browser: Browser, predictor: Predictor, entries: list[Entry], tmp_path: Path
+) -> None:
+    page, errors = browser
+    door = Door(3.0, 0.0, 90.0, 0.9, DoorState.OPEN, hinge="left", opening_angle_deg=80.0)
+    plan = plan_svg(make_plan(Prediction.from_doors([door], [], 1, 1.0), ["a <b> & #c%"]))
+    path = tmp_path / "view.html"
+    path.write_text(render_cloud_page(predictor, [entries[0] | {"plan": plan}, entries[1] | {"plan": ""}]))
+    page.goto(path.as_uri())
+    wait_until(page, "document.querySelector('#plan').naturalWidth > 100")
+    assert page.locator("#plan").is_visible()
+    page.keyboard.press("ArrowRight")
+    assert not page.locator("#plan").is_visible()
     assert errors == []

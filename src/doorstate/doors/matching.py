@@ -165,13 +165,17 @@ def _options(seen: Door, named: Sequence[NamedDoor], camera: CameraPlace) -> lis
 def _pairs(seen: Door, named: Sequence[NamedDoor], camera: CameraPlace) -> Iterator[_Pair]:
     error_m = _INFLATION * max(_LEAST_M, _USUAL_M if seen.position_error_m is None else seen.position_error_m)
     error_deg = _INFLATION * max(_LEAST_DEG, _USUAL_DEG if seen.yaw_error_deg is None else seen.yaw_error_deg)
+    pose_m = max(camera.position_error_m, _LEAST_POSE_M)
     for number, door in enumerate(named):
         if door.frame != camera.frame:
             continue
-        x_m, y_m, yaw_deg = expected_door(door, camera)
-        turn = math.radians(math.remainder(seen.yaw_deg - yaw_deg, 360.0))
         behind_m = 0.0 if door.is_front(camera.pose.x_m, camera.pose.y_m) else _BEHIND_M
         variance = error_m**2 + door.position_error_m**2 + behind_m**2
+        x_m, y_m, yaw_deg = expected_door(door, camera)
+        # Of most doors of a long list: an error of the heading moves no door nearer.
+        if math.hypot(x_m, y_m) > seen.distance_m + math.sqrt(GATE * (variance + pose_m**2)):
+            continue
+        turn = math.radians(math.remainder(seen.yaw_deg - yaw_deg, 360.0))
         yield _Pair(
             number,
             np.array([seen.x_m - x_m, seen.y_m - y_m, turn]),

@@ -63,8 +63,6 @@ def predict_named(
         )
         return door if is_door else None
 
-    level = points if prediction.tilt is None else prediction.tilt.to_level(points)
-    tracked = tracker.update(
-        prediction, camera, stamp_s, View.of(level), frame=frame, ask=ask if asks else None
-    )
+    view = View.of(points, prediction.tilt)
+    tracked = tracker.update(prediction, camera, stamp_s, view, frame=frame, ask=ask if asks else None)
     return NamedPrediction(prediction, tracked)

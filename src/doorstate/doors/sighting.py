@@ -15,6 +15,7 @@ from doorstate.errors import WriteParameter, python_parameter
 from doorstate.inference.door import Door
 from doorstate.inference.serialization import door_to_dict
 from doorstate.inference.state_filter import FilteredState
+from doorstate.inference.tilt import Tilt
 from doorstate.types import DoorState, Points
 
 NOT_SEEN = "not_seen"  # in place of a state
@@ -54,11 +55,17 @@ class View(NamedTuple):
     reach_m: float = _REACH_M
 
     @classmethod
-    def of(cls, points: Points) -> Self:
-        """Return the view of the measured points (..., 3) of a cloud; of nothing without any."""
+    def of(cls, points: Points, tilt: Tilt | None = None) -> Self:
+        """Return the view of the measured points (..., 3) of a cloud; of nothing without any.
+
+        Args:
+            points: points; level ones without a tilt.
+            tilt: tilt that was found in them.
+        """
         flat = points.reshape(-1, 3)
         sample = flat[:: max(1, len(flat) // _SAMPLE_POINTS) | 1]
         sample = sample[is_measured(sample)]
+        sample = sample if tilt is None else tilt.to_level(sample)
         if len(sample) == 0:
             return cls(0.0, 0.0, 0.0)
         bearing_deg = np.degrees(np.arctan2(sample[:, 1], sample[:, 0]))
