@@ -37,6 +37,7 @@ PAGES = (
     "docs/tilt.md",
     "docs/deployment.md",
     "docs/doors.md",
+    "docs/live-camera.md",
     "docs/onnx.md",
     "docs/view.md",
 )

@@ -7,6 +7,7 @@ DoorstateError
 │   └── CloudContentError  readable, but of another form or in wrong units
 │       └── TooFewPointsError  empty, all NaN, or hardly anything measured
 ├── CameraError            intrinsics or depth settings missing or impossible
+│   └── CameraGoneError    an attached camera is not there, or not any more
 ├── ConfigError            an option or experiment file asks for something that does not exist
 ├── DatasetError           a data set folder is missing, incomplete or inconsistent
 ├── RunError               a training run or comparison folder cannot be used or continued
@@ -133,6 +134,10 @@ class CameraError(DoorstateError):
     """Camera intrinsics, depth scale or roll are missing or impossible."""
 
 
+class CameraGoneError(CameraError):
+    """An attached camera is not there, or not any more; it may come back."""
+
+
 class ConfigError(DoorstateError):
     """An option or experiment file asks for something that does not exist."""
 
@@ -189,6 +194,10 @@ EXTRAS = {
     "bags": ("rosbags",),
     "cluster": ("ray",),
     "mqtt": ("paho",),
+    "realsense": ("pyrealsense2",),
+    "oak": ("depthai",),
+    "orbbec": ("pyorbbecsdk",),
+    "openni": ("openni",),
 }
 """Modules of the optional dependencies, by the name of the extra that installs them (pyproject.toml)."""
 

@@ -29,6 +29,7 @@ from doorstate.cli.simulate import simulate
 from doorstate.cli.train import train
 from doorstate.cli.transfer import transfer
 from doorstate.cli.view import view
+from doorstate.cli.watch import watch
 
 _COMMANDS = (
     simulate,
@@ -43,6 +44,7 @@ _COMMANDS = (
     label,
     evaluate,
     view,
+    watch,
     serve,
     export,
     export_sdf,

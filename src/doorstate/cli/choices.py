@@ -142,6 +142,12 @@ def _inputs() -> Iterable[str]:
     return NORMALIZATIONS
 
 
+def _cameras() -> Iterable[str]:
+    from doorstate.cameras.registry import CAMERAS
+
+    return CAMERAS
+
+
 PACKAGED = Choice("packaged weights", "network", _packaged, _offered)
 NETWORK = Choice("network", "network", _networks)
 RULE = Choice("rule", "rule", _rules)
@@ -155,6 +161,7 @@ RAW_KIND = Choice("kind of raw file", "keep", _raw_kinds)
 INPUT = Choice("input", "input", _inputs)
 KEPT_CROPS = Choice("choice of crops", "crops", lambda: ("all", "best"))
 ENGINE = Choice("engine", "engine", lambda: ("processes", "ray"))
+CAMERA = Choice("camera", "camera", _cameras)
 
 _PLACEHOLDERS = {
     "packaged": PACKAGED,
@@ -170,6 +177,7 @@ _PLACEHOLDERS = {
     "inputs": INPUT,
     "kept_crops": KEPT_CROPS,
     "engines": ENGINE,
+    "cameras": CAMERA,
 }
 
 

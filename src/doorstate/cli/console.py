@@ -4,9 +4,11 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from typing import Any
 
 from rich.console import Console
@@ -55,3 +57,31 @@ def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]
     for row in rows:
         table.add_row(*(Text(printable(cell)) for cell in row))
     PrintingConsole(**_PLAIN, width=None if sys.stdout.isatty() else _PIPE_WIDTH).print(table)
+
+
+@contextmanager
+def native_output_on_stderr() -> Iterator[None]:
+    """Send what libraries of C write on standard output to standard error; what Python writes stays where it goes."""
+    try:
+        is_ours = sys.stdout.fileno() == 1
+    except (OSError, ValueError):  # replaced by a program
+        is_ours = False
+    if not is_ours:
+        yield
+        return
+    python_output = sys.stdout
+    python_output.flush()
+    kept = os.dup(1)
+    os.dup2(2, 1)
+    sys.stdout = os.fdopen(
+        os.dup(kept), "w", encoding=python_output.encoding, errors=python_output.errors, buffering=1
+    )
+    try:
+        yield
+        sys.stdout.flush()
+    finally:
+        os.dup2(kept, 1)
+        os.close(kept)
+        own, sys.stdout = sys.stdout, python_output
+        with suppress(OSError):
+            own.close()

@@ -15,6 +15,7 @@ _FLAGS = {
     "recipe_changes": "--set",
     "dataset": "--data",
     "memory_bytes": "--memory-gib",
+    "recording": "--play",
 }
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from doorstate.cli.options import CameraInfoTopic, Every, Topic
+from doorstate.cli.options import CameraInfoTopic, Every, OpenBrowser, Topic
 from doorstate.cli.reading_options import with_reading_options
 from doorstate.errors import ConfigError
 
@@ -38,10 +38,7 @@ def label(
         ),
     ] = None,
     port: Annotated[int, typer.Option(help="Port of the page; 0 chooses a free one.", min=0, max=65535)] = 0,
-    open_browser: Annotated[
-        bool,
-        typer.Option("--open/--no-open", help="Open the page in the browser, or only print its address."),
-    ] = True,
+    open_browser: OpenBrowser = True,
     *,
     options: ReadOptions,
 ) -> None:

@@ -69,6 +69,10 @@ Device = Annotated[
 
 Every = Annotated[int, typer.Option("--every", help="Use only every Nth file or message.", min=1)]
 
+OpenBrowser = Annotated[
+    bool, typer.Option("--open/--no-open", help="Open the page in the browser, or only print its address.")
+]
+
 # Doors that are known to be in view.
 DoorKnownFlag = Annotated[
     bool, typer.Option("--door-known", help="A door is known to be in view: no door is no answer.")

@@ -16,7 +16,7 @@ from doorstate.pages.plan import plan_of_record
 from doorstate.pages.plan_text import SIGN_WIDTH, ascii_only, door_sign, plan_text
 from doorstate.types import ABSTAINED
 
-_STATE_STYLES = {"closed": "red", "semi_open": "yellow", "open": "green"}
+STATE_STYLES = {"closed": "red", "semi_open": "yellow", "open": "green"}
 _MISSING = "-"
 _GAP = "  "
 _NARROWEST_NAME = 12
@@ -56,7 +56,7 @@ def _milliseconds(row: dict[str, Any]) -> str:
     return f"{row['milliseconds']:.0f}" if "milliseconds" in row else ""
 
 
-def _side(bearing_deg: float) -> str:
+def side_of(bearing_deg: float) -> str:
     """Return the direction of a door in words."""
     degrees = round(abs(bearing_deg))
     return "ahead" if degrees == 0 else f"{degrees}° {'left' if bearing_deg > 0 else 'right'}"
@@ -118,7 +118,7 @@ class PredictionTable:
         is_named = "named_doors" in row
         for number, door in enumerate(doors if is_named else doors[1:], 1 if is_named else 2):
             name = printable(door["name"]) if is_named else f"door {number}"
-            long, short = f"{indent}{name}, {_signs(_side(door['bearing_deg']))}", f"{indent}{name}"
+            long, short = f"{indent}{name}, {_signs(side_of(door['bearing_deg']))}", f"{indent}{name}"
             if not is_named:
                 short = f"{indent}{number}"
             self._print_answer(long if len(long) <= self._name_width else short, door)
@@ -131,7 +131,7 @@ class PredictionTable:
         """Print a prediction, or one of its further doors."""
         line = Text(_fit(name, self._name_width))
         state = answer["state"]
-        line.append(f"{_GAP}{state or ABSTAINED:<{_STATE_WIDTH}}", _STATE_STYLES.get(state, "bold"))
+        line.append(f"{_GAP}{state or ABSTAINED:<{_STATE_WIDTH}}", STATE_STYLES.get(state, "bold"))
         line.append(_GAP + _signs(door_sign(state, answer.get("hinge"))))
         for column in _COLUMNS:
             line.append(f"{_GAP}{_signs(column.cell(answer)):>{column.width}}")
@@ -159,7 +159,7 @@ class PredictionTable:
             line = Text("  " + (drawing.lines[row] if row < len(drawing.lines) else blank))
             for mark in drawing.marks:
                 if mark.row == row:
-                    style = _STATE_STYLES.get(doors[mark.door]["state"], "bold")
+                    style = STATE_STYLES.get(doors[mark.door]["state"], "bold")
                     line.stylize(style, mark.column + 2, mark.column + 2 + mark.length)
             if row < len(notes):
                 line.append(_GAP + notes[row][0], notes[row][1])
@@ -196,8 +196,8 @@ def _notes(number: int, door: dict[str, Any], count: int) -> list[tuple[str, str
     head = f"{label}  {state or ABSTAINED}".strip()
     if (angle_deg := door.get("opening_angle_deg")) is not None and state not in (None, "closed"):
         head += f" {angle_deg:.0f}°"
-    lines = [(head, _STATE_STYLES.get(state, "bold"))]
-    lines.append((f"  {door['distance_m']:.2f} m, {_side(door['bearing_deg'])}", ""))
+    lines = [(head, STATE_STYLES.get(state, "bold"))]
+    lines.append((f"  {door['distance_m']:.2f} m, {side_of(door['bearing_deg'])}", ""))
     if state is not None and (passable_m := door.get("passable_width_m")) is not None:
         lines.append((f"  {passable_m:.2f} m of {door['width_m']:.2f} m free", ""))
     return lines

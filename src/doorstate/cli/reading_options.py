@@ -15,6 +15,21 @@ from doorstate.errors import CameraError, ConfigError
 if TYPE_CHECKING:
     from doorstate.io.options import ReadOptions
 
+Roll = Annotated[
+    float | None, typer.Option(help="Clockwise rotation of the camera, seen from behind, in degrees.")
+]
+Pitch = Annotated[
+    float | None,
+    typer.Option(
+        help="Angle by which the camera looks down, in degrees. [default: 0; weights for doorways find the tilt"
+        " themselves if neither is given]",
+        show_default=False,
+    ),
+]
+CameraHeight = Annotated[
+    float | None, typer.Option(help="Height of the camera above the floor in metres, if it is known.")
+]
+
 
 def read_options(
     axes: Annotated[
@@ -25,17 +40,8 @@ def read_options(
             show_default=False,
         ),
     ] = "auto",
-    roll: Annotated[
-        float | None, typer.Option(help="Clockwise rotation of the camera, seen from behind, in degrees.")
-    ] = None,
-    pitch: Annotated[
-        float | None,
-        typer.Option(
-            help="Angle by which the camera looks down, in degrees. [default: 0; weights for doorways find the tilt"
-            " themselves if neither is given]",
-            show_default=False,
-        ),
-    ] = None,
+    roll: Roll = None,
+    pitch: Pitch = None,
     quaternion: Annotated[
         str | None,
         typer.Option(
@@ -43,10 +49,7 @@ def read_options(
             " frame, as tf2_echo prints."
         ),
     ] = None,
-    camera_height: Annotated[
-        float | None,
-        typer.Option(help="Height of the camera above the floor in metres, if it is known."),
-    ] = None,
+    camera_height: CameraHeight = None,
     ignore_viewpoint: Annotated[
         bool, typer.Option("--ignore-viewpoint", help="Ignore VIEWPOINT of PCD files.")
     ] = False,

@@ -21,6 +21,7 @@ from doorstate.cli.options import (
     DoorPose,
     Every,
     NetworkNames,
+    OpenBrowser,
     PointCount,
     RuleNames,
     Threads,
@@ -59,10 +60,7 @@ def view(
     out: Annotated[
         Path | None, typer.Option(help="Write the page to this .html file, without opening a browser.")
     ] = None,
-    open_browser: Annotated[
-        bool,
-        typer.Option("--open/--no-open", help="Open the page in the browser, or only print its address."),
-    ] = True,
+    open_browser: OpenBrowser = True,
     every: Every = 1,
     live: Annotated[
         bool, typer.Option("--live", help="Show a bag or a folder as clouds arrive, until Ctrl-C.")

@@ -47,6 +47,8 @@ AbstentionCode = Literal[
     "unusable_cloud",
     "damaged_message",
     "no_message",
+    "camera_gone",
+    "stale_frame",
 ]
 
 SENTENCES: dict[AbstentionCode, str] = {
@@ -104,6 +106,8 @@ SENTENCES: dict[AbstentionCode, str] = {
     "no_door": "there seems to be no door: its probability is {probability:.2f}",
     "unsure": "unsure: {state} has probability {probability:.2f}, these weights need {min_probability:.2f}",
     "no_message": "no message for {silence_s:g} s",
+    "camera_gone": "no camera: {cause}",
+    "stale_frame": "the image was {age_s:.1f} s old when it was answered: at most {max_age_s:g} may be",
 }
 
 

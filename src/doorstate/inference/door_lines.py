@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from doorstate.inference.door import Door
 from doorstate.inference.prediction import Prediction
 
+DOOR_FRAME = "door frame"  # name of the first line of each door
 DOOR_HEIGHT_M = 2.0  # of the drawing; no head predicts it
 _REFUSED_HEIGHT_M = 1.0  # lower than doors, so that both can be told apart where they overlap
 SWING_DEG = 90.0  # a leaf is drawn with the way that it takes to be open
@@ -78,7 +79,7 @@ def door_lines(prediction: Prediction, floor_z_m: float, *, refused: bool = Fals
 
 def _lines(door: Door, floor_z_m: float, label: str) -> list[Line]:
     """Return the lines of one door, those that follow from its values."""
-    frame = Line("door frame", _frame(door, floor_z_m, DOOR_HEIGHT_M), label)
+    frame = Line(DOOR_FRAME, _frame(door, floor_z_m, DOOR_HEIGHT_M), label)
     leaf_plan = LeafPlan.of(door)
     if leaf_plan is None:
         return [frame]

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -96,9 +97,22 @@ class DoorWatch:
             received_ns: stamp to use if the message has none.
         """
         stamp_ns = stamp_ns_of(message) or received_ns
-        stamp_s = stamp_ns / 1e9
-        self._frame_id = str(message.header.frame_id)
-        seen = self._predict(message)
+        return self.report(lambda: self._cloud(message), stamp_ns, str(message.header.frame_id))
+
+    def report(
+        self, read: Callable[[], PosedCloud], stamp_ns: int, frame_id: str, steady_s: float | None = None
+    ) -> DoorReport:
+        """Return the report after a cloud; one that cannot be read is unknown, with the reason.
+
+        Args:
+            read: returns the cloud in the body frame.
+            stamp_ns: its time.
+            frame_id: frame of the cloud as stored.
+            steady_s: its time by a clock that never jumps, for filter and hold; None: as `stamp_ns`.
+        """
+        stamp_s = stamp_ns / 1e9 if steady_s is None else steady_s
+        self._frame_id = frame_id
+        seen = self._predict(read)
         prediction = seen.prediction
         if prediction.state is not None:
             self._last_state_s = stamp_s
@@ -127,10 +141,16 @@ class DoorWatch:
             seen.pose,
         )
 
-    def report_silence(self, now_ns: int) -> DoorReport:
-        """Return the report when no message has come for `silence_s`: unknown, and earlier messages are forgotten."""
+    def report_silence(self, now_ns: int, abstention: Abstention | None = None) -> DoorReport:
+        """Return the report when nothing has come: unknown, and what came earlier is forgotten.
+
+        Args:
+            now_ns: time of the report.
+            abstention: reason; None: no message for `silence_s`.
+        """
         self._reset()
-        prediction = Prediction.abstain(Abstention("no_message", {"silence_s": self._settings.silence_s}))
+        silence = Abstention("no_message", {"silence_s": self._settings.silence_s})
+        prediction = Prediction.abstain(abstention or silence)
         filtered = StateFilter().update(prediction, now_ns / 1e9)
         return DoorReport(now_ns, self._frame_id, prediction, filtered, None, False, np.zeros(3))
 
@@ -138,11 +158,11 @@ class DoorWatch:
         self._filter, self._hold_timer = StateFilter(), HoldTimer()
         self._last_state_s = -math.inf
 
-    def _predict(self, message: Any) -> _Seen:
-        """Return the prediction for a message, with the pose of its camera and the places of its points."""
+    def _predict(self, read: Callable[[], PosedCloud]) -> _Seen:
+        """Return the prediction for a cloud, with the pose of its camera and the places of its points."""
         sample, pose = np.empty((0, 3), np.float32), DEFAULT_OPTIONS.pose()
         try:
-            points, pose = self._cloud(message)
+            points, pose = read()
             sample = _sample(points)
             return _Seen(sample, pose, predict_posed(self._predictor, points, pose, self._door_known))
         except DoorstateError as error:

@@ -30,7 +30,7 @@ from doorstate.io.rotations import (
 from doorstate.io.viewpoint import Viewpoint
 from doorstate.types import Points
 
-Origin = Literal["assumed", "given", "frame_id", "depth image", "VIEWPOINT"]
+Origin = Literal["assumed", "given", "frame_id", "depth image", "VIEWPOINT", "accelerometer"]
 """Where a part of a pose comes from."""
 
 _LYING_DEG = 60.0

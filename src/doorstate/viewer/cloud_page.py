@@ -32,7 +32,7 @@ from doorstate.viewer.named_clouds import NamedCloud
 
 Entry = dict[str, Any]
 """Cloud as the page gets it: `name` and `truth`, and either `error` or `prediction`, `cloud`, `whole`, `floor_z_m`,
-`plan` and `detections`."""
+`plan` and `detections`; of a live camera `facts` as well."""
 
 WHOLE_POINTS = 8000  # of the whole cloud, drawn under the points that were used
 _PLAN_PX_PER_M = 48.0  # beside the cloud
@@ -80,13 +80,43 @@ def make_entry(
         steps = np.rint(counts[:NUM_POINTS] * CHANNEL_STEPS).astype("<u2")
         entry["channels"] = encode_bytes(steps.tobytes())
     parts = None if named.parts is None else named.parts[prepared.indices[:NUM_POINTS]]
+    entry["cloud"] = encode_cloud(prepared.points[:NUM_POINTS], parts)
+    return entry | _encode_prediction(prediction, named, parameter, shown)
+
+
+def make_live_entry(
+    prediction: Prediction,
+    named: NamedCloud,
+    facts: Sequence[tuple[str, str]],
+    parameter: WriteParameter = python_parameter,
+    shown: Shown = SHOWN,
+) -> Entry:
+    """Encode a prediction that was made elsewhere, with the cloud alone.
+
+    Args:
+        prediction: prediction for the cloud.
+        named: cloud; an error without one.
+        facts: names and texts to list besides those of the prediction.
+        parameter: how errors write parameters.
+        shown: candidates to draw.
+    """
+    entry: Entry = {"name": named.name, "truth": "", "facts": list(facts)}
+    if isinstance(named.cloud, DoorstateError):
+        return entry | {"error": named.cloud.describe(parameter, with_path=False)}
+    encoded = _encode_prediction(prediction, named, parameter, shown)
+    return entry | encoded | {"cloud": encoded["whole"]}
+
+
+def _encode_prediction(
+    prediction: Prediction, named: NamedCloud, parameter: WriteParameter, shown: Shown
+) -> Entry:
+    assert not isinstance(named.cloud, DoorstateError)
     whole = thin_for_display(named.cloud)
     if prediction.tilt is not None:
         whole = prediction.tilt.to_level(whole)
     floor_z_m = lowest_z_m(whole)
-    return entry | {
+    return {
         "prediction": prediction_to_dict(prediction, parameter, named.pose),
-        "cloud": encode_cloud(prepared.points[:NUM_POINTS], parts),
         "whole": encode_cloud(whole),
         "floor_z_m": round(floor_z_m, 3),
         "plan": _plan(named.cloud, prediction, floor_z_m),

@@ -164,7 +164,8 @@
     const plan = element("plan");
     plan.hidden = !entry.plan;
     if (entry.plan) plan.src = `data:image/svg+xml,${encodeURIComponent(entry.plan)}`;
-    element("facts").replaceChildren(...(prediction ? facts(prediction) : []).filter(([, value]) => value).flatMap(
+    const all = [...(prediction ? facts(prediction) : []), ...(entry.facts ?? []).map((fact) => [...fact, "wide"])];
+    element("facts").replaceChildren(...all.filter(([, value]) => value).flatMap(
       ([name, value, className = ""]) => [make("dt", { className }, name), make("dd", { className }, value)]));
   }
 

@@ -1,0 +1,237 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`doorstate watch`: with the simulated camera, and with one that is unplugged by a script."""
+
+from __future__ import annotations
+
+import http.client
+import io
+import json
+import signal
+import threading
+import time
+from collections.abc import Callable
+from contextlib import closing, suppress
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from doorstate.cameras import registry
+from doorstate.cameras.clock import DayTime
+from doorstate.cameras.grabber import Counts
+from doorstate.cameras.watcher import CameraWatch, Notice
+from doorstate.cli import watch_output
+from doorstate.cli.depth_picture import depth_picture, depth_pixels, draw_line
+from doorstate.inference.door import Door
+from doorstate.inference.door_lines import Line
+from doorstate.inference.prediction import Prediction
+from doorstate.inference.watch_settings import WatchSettings
+from doorstate.simulation.camera import DepthCamera
+from doorstate.simulation.frames import Frame
+from doorstate.types import DoorState
+from tests.cameras.scripted import ABSENT, GONE, FixedPredictor, ScriptedCamera, frame
+from tests.cli.helpers import Run, check_error
+from tests.cli.test_view import free_port
+
+SMALL = ("--camera", "simulated", "--size", "64x48", "--fps", 20)
+
+
+@pytest.fixture
+def watch(run: Run, weights: Path) -> Run:
+    """Run `doorstate watch` with an untrained network."""
+    return partial(run, "watch", "--weights", weights)
+
+
+@pytest.fixture
+def scripted(monkeypatch: pytest.MonkeyPatch, frames: list[Frame]) -> Callable[..., ScriptedCamera]:
+    """Let `--camera simulated` be a camera that follows a script of numbers of frames and of what happens."""
+    pixels = np.nan_to_num(frames[0].cut.depth_m[::4, ::4] * 1000).astype(np.uint16)
+    camera = DepthCamera(width=160, height=120).intrinsics()
+
+    def script(*items: int | str) -> ScriptedCamera:
+        made = ScriptedCamera(
+            (
+                item if isinstance(item, str) else replace(frame(item), depth=pixels, intrinsics=camera)
+                for item in items
+            ),
+            pause_s=0.05,
+        )
+        monkeypatch.setattr(registry, "make_camera", lambda kind: made)
+        return made
+
+    return script
+
+
+def test_json_has_a_line_for_each_answer(watch: Run) -> None:
+    code, out, err = watch(*SMALL, "--json", "--seconds", 1.5)
+    assert code == 0
+    rows = [json.loads(line) for line in out.splitlines()]
+    assert len(rows) > 3
+    assert [notice["code"] for notice in rows[0]["notices"]] == ["camera_opened"]
+    assert set(rows[0]["over_time"]) == {"state", "probabilities", "held_s", "is_open"}
+    assert all(row["latency_ms"] > 0 and row["milliseconds"] >= 0 for row in rows)
+    assert rows[-1]["sensor_pose"]["tilt_from"] == "accelerometer"
+    assert abs(rows[-1]["stamp_s"] - time.time()) < 60
+    assert [row["stamp_s"] for row in rows] == sorted({row["stamp_s"] for row in rows})
+    assert err.startswith("stopped: ")
+
+
+def test_lines_and_a_recording_that_predict_reads(
+    watch: Run, run: Run, weights: Path, tmp_path: Path
+) -> None:
+    pytest.importorskip("rosbags")
+    bag = tmp_path / "run.bag"
+    code, out, err = watch(*SMALL, "--seconds", 1, "--record", bag)
+    assert code == 0
+    assert "simulated camera drive" in out.splitlines()[0]
+    assert str(bag) in err
+    code, out, _ = run("predict", "--bag", bag, "--weights", weights, "--json")
+    assert code == 0
+    assert len(out.splitlines()) > 3
+
+
+def test_a_camera_that_is_unplugged_is_told_and_its_state_is_gone(
+    watch: Run, scripted: Callable[..., ScriptedCamera]
+) -> None:
+    scripted(*range(5), GONE, ABSENT, *range(5, 10), *["nothing"] * 1000)
+    code, out, err = watch("--camera", "simulated", "--json", "--seconds", 3)
+    assert code == 0
+    rows = [json.loads(line) for line in out.splitlines()]
+    codes = [notice["code"] for row in rows for notice in row["notices"]]
+    assert codes[:3] == ["camera_opened", "camera_gone", "camera_opened"]
+    gone = [row for row in rows if "no camera" in row.get("reason", "")]
+    assert gone
+    assert all(row["state"] is row["over_time"]["state"] is None for row in gone)
+    assert "gone 1 time" in err
+
+
+@pytest.fixture
+def ctrl_c() -> None:
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # background processes ignore SIGINT
+
+
+def press_ctrl_c() -> None:
+    main_thread = threading.main_thread().ident
+    assert main_thread is not None
+    signal.pthread_kill(main_thread, signal.SIGINT)
+
+
+@pytest.mark.usefixtures("ctrl_c")
+def test_ctrl_c_ends_it_and_the_recording_is_there(watch: Run, tmp_path: Path) -> None:
+    pytest.importorskip("rosbags")
+    timer = threading.Timer(2.0, press_ctrl_c)
+    timer.start()
+    code, _, err = watch(*SMALL, "--record", tmp_path / "run.mcap")
+    timer.join()
+    assert code == 0
+    assert err.startswith("stopped: ")
+    assert (tmp_path / "run.mcap").is_file()
+    assert "camera" not in {thread.name for thread in threading.enumerate()}
+
+
+@pytest.mark.usefixtures("ctrl_c")
+def test_the_page_gets_answers_and_the_end_of_the_camera(
+    watch: Run, scripted: Callable[..., ScriptedCamera]
+) -> None:
+    scripted(*range(10), GONE, *[ABSENT] * 1000)
+    port, events = free_port(), list[str]()
+    reader = threading.Thread(target=read_events, args=(port, events))
+    reader.start()
+    code, out, _ = watch("--camera", "simulated", "--view", "--no-open", "--port", port)
+    reader.join()
+    assert (code, out) == (0, f"http://127.0.0.1:{port}/\n")
+    entries = [json.loads(line.removeprefix("data: ")) for line in events if line.startswith("data: {")]
+    assert [name for name, _ in entries[0]["facts"]] == ["over time", "latency", "notice"]
+    assert entries[0]["cloud"] == entries[0]["whole"]
+    assert "error" not in entries[0]
+    assert "unplugged" in entries[-1]["error"]
+    assert "prediction" not in entries[-1]
+
+
+def read_events(port: int, events: list[str]) -> None:
+    """Read events until one tells that the camera is gone, then press Ctrl-C."""
+    try:
+        for _ in range(600):
+            with suppress(ConnectionRefusedError):  # not started yet
+                connection = http.client.HTTPConnection("127.0.0.1", port, timeout=30)
+                connection.request("GET", "/events")
+                break
+            time.sleep(0.05)
+        with closing(connection), closing(connection.getresponse()) as response:
+            while "unplugged" not in "".join(events):
+                events.append(response.readline().decode())
+    finally:
+        press_ctrl_c()
+
+
+def test_attached_cameras_are_listed(run: Run) -> None:
+    code, out, _ = run("watch", "--list")
+    assert code == 0
+    assert "loose-cable" in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected_code", "name"),
+    [
+        ((), 2, "--camera"),
+        (("--camera", "realsens"), 2, "realsense"),
+        (("--camera", "simulated", "--port", 8000), 2, "--port"),
+        (("--camera", "simulated", "--view", "--json"), 2, "--json"),
+        (("--camera", "simulated", "--size", "640"), 2, "--size"),
+        (("--camera", "simulated", "--record", "run.txt"), 2, "--record"),
+        (("--camera", "simulated", "--play", "run.db3"), 2, "--play"),
+        (("--camera", "simulated", "--pitch", 200), 2, "--pitch"),
+        (("--camera", "simulated", "--serial", "7"), 1, "7"),
+    ],
+)
+def test_usage_errors(arguments: tuple[object, ...], expected_code: int, name: str, watch: Run) -> None:
+    check_error(watch(*arguments), expected_code, name)
+
+
+def one_report(**changes: Any) -> Any:
+    watch = CameraWatch(WatchSettings(), FixedPredictor(DoorState.OPEN), day_time=DayTime())
+    return replace(watch.answer(frame(1), Counts(grabbed=3, dropped=1)), **changes)
+
+
+def test_the_terminal_shows_picture_state_doors_and_notices() -> None:
+    shown = Console(width=100, height=20, record=True, file=io.StringIO())
+    shown.print(watch_output.describe(one_report(notices=(Notice("clock_jumped", "+2.0 s"),))))
+    text = shown.export_text()
+    assert text.count("▀") == 8 * 3, "8 x 6 pixels"
+    assert "unknown" in text
+    assert "dropped 1 of 3" in text
+    assert "+2.0 s" in text
+    assert "accelerometer" in text
+
+
+def test_near_is_bright_far_is_dark_and_nothing_is_black() -> None:
+    wall = frame(1)
+    wall.depth[:, :2], wall.depth[:, 6:] = 900, 4900
+    wall.depth[:2] = 0
+    pixels = depth_pixels(wall, 4, 3).astype(int).sum(axis=2)
+    assert (pixels[0] == 0).all()
+    assert pixels[1, 0] > pixels[1, 1] > pixels[1, 3] > 0
+    metres = replace(
+        wall, depth=np.where(wall.depth == 0, np.nan, wall.depth / 1000).astype(np.float32), depth_scale_m=1
+    )
+    assert np.abs(depth_pixels(metres, 4, 3).astype(int).sum(axis=2) - pixels).max() <= 3
+
+
+def test_frames_of_doors_are_drawn_where_the_camera_sees_them() -> None:
+    wall = frame(1)
+    camera = wall.intrinsics
+    x_m = (2.0 - camera.cx) * 2 / camera.fx
+    line = Line("door frame", np.array([[x_m, -1.0, 2.0], [x_m, 1.0, 2.0], [x_m, 1.0, -2.0]]))
+    pixels = depth_pixels(wall, 8, 6)
+    draw_line(pixels, line, camera, (1, 2, 3))
+    assert set(np.argwhere((pixels == [1, 2, 3]).all(axis=2))[:, 1]) == {2}
+    door = Door(2.0, 0.4, 90.0, 0.9, DoorState.OPEN)
+    prediction = Prediction.from_doors([door], [], 100, 1.0)
+    picture = depth_picture(wall, replace(one_report().door, prediction=prediction, lines=(line,)), 8, 3)
+    assert len(picture.plain.splitlines()) == 3
+    green = [span.start for span in picture.spans if "#3ce16e" in str(span.style)]
+    assert {start % 9 for start in green} == {2}
