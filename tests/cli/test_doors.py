@@ -164,6 +164,7 @@ def test_a_list_is_listed_and_checked(run: Run, folder: Path) -> None:
     code, out, _ = run("doors", "check", "doors.yaml", "--pose-error", "0.9 10")
     assert code == 0
     assert "ahead and beside" in out
+    check_error(run("doors", "check", "doors.yaml", "--pose-error", "much"), 2, "--pose-error")
     Path("doors.yaml").write_text("doors:\n- id: a\n  width_m: 100\n")
     code, out, err = run("doors", "check", "doors.yaml")
     assert (code, out) == (1, "")

@@ -14,6 +14,7 @@ from doorstate.cli.named_options import (
     PoseAxes,
     PoseError,
     PosesOption,
+    parse_pose_error,
     read_camera_poses,
 )
 from doorstate.cli.options import AsJson
@@ -75,7 +76,6 @@ def check(
     from doorstate.cli.prediction_summary import count
     from doorstate.doors.door_file import check_doors
     from doorstate.doors.neighbours import alike_doors
-    from doorstate.doors.pose_file import DEFAULTS
     from doorstate.errors import DoorFileError
 
     doors, problems = check_doors(read_input_text(file, MAX_SETTINGS_BYTES, DoorFileError))
@@ -83,12 +83,10 @@ def check(
         stderr.print(f"{file}: {problem}", style="red")
     if problems or doors is None:
         raise typer.Exit(1)
-    known = read_camera_poses(poses, camera_pose, pose_error or "0.1 3", pose_axes, map_frame)
+    error_m, error_deg = parse_pose_error(pose_error)
+    known = read_camera_poses(poses, camera_pose, pose_error, pose_axes, map_frame)
     frames = sorted({door.frame for door in doors.doors})
     stdout.print(f"{count(len(doors.doors), 'door')} in {', '.join(frames) or 'no map'}")
-    error_m, error_deg = DEFAULTS.position_error_m, DEFAULTS.yaw_error_deg
-    if pose_error is not None:
-        error_m, error_deg = (float(part) for part in pose_error.replace(",", " ").split())
     if known is not None and known.file is not None:
         places = [
             *known.file.places,

@@ -77,6 +77,25 @@ class CameraPoses:
         return self.file.at(stamp_s)
 
 
+def parse_pose_error(text: str | None) -> tuple[float, float]:
+    """Return the standard errors of poses, in metres and degrees; None is the default.
+
+    Raises:
+        ConfigError: not two numbers.
+    """
+    from doorstate.doors.camera_place import POSITION_ERROR_M, YAW_ERROR_DEG
+
+    if text is None:
+        return POSITION_ERROR_M, YAW_ERROR_DEG
+    try:
+        error_m, error_deg = (float(part) for part in text.replace(",", " ").split())
+        if not (0 <= error_m < 100 and 0 <= error_deg < 180):
+            raise ValueError
+    except ValueError as error:
+        raise ConfigError(f"--pose-error {text!r}: expected two numbers: metres degrees") from error
+    return error_m, error_deg
+
+
 def read_camera_poses(
     poses: Path | None, camera_pose: str | None, pose_error: str | None, pose_axes: str, map_frame: str
 ) -> CameraPoses | None:
@@ -93,14 +112,8 @@ def read_camera_poses(
     if poses is None and camera_pose is None:
         return None
     defaults = DEFAULTS._replace(frame=map_frame, axes=pose_axes)
-    if pose_error is not None:
-        try:
-            error_m, error_deg = (float(part) for part in pose_error.replace(",", " ").split())
-            if not (0 <= error_m < 100 and 0 <= error_deg < 180):
-                raise ValueError
-        except ValueError as error:
-            raise ConfigError(f"--pose-error {pose_error!r}: expected two numbers: metres degrees") from error
-        defaults = defaults._replace(position_error_m=error_m, yaw_error_deg=error_deg)
+    error_m, error_deg = parse_pose_error(pose_error)
+    defaults = defaults._replace(position_error_m=error_m, yaw_error_deg=error_deg)
     try:
         if camera_pose is not None:
             return CameraPoses(None, parse_place(camera_pose, defaults))
