@@ -218,6 +218,38 @@ def buildings(
 
 
 @app.command()
+def sites(
+    out: Out = Path("docs/benchmarks"),
+    weights: Annotated[
+        list[str] | None,
+        typer.Option(help="Weights, by name or path; repeatable. [default: the default network]"),
+    ] = None,
+    count: Annotated[list[int] | None, typer.Option(help="Labelled frames; repeatable.", min=5)] = None,
+    seeds: Annotated[int, typer.Option(help="Number of buildings.", min=1)] = 10,
+    sensor: Annotated[str, typer.Option(help="Camera of the buildings.")] = "xtion-matching",
+    folder: Annotated[Path, typer.Option(help="Folder of all files; what is done in it is kept.")] = Path(
+        "runs/sites"
+    ),
+) -> None:
+    """Adapt weights to labelled frames of three doors of simulated buildings, and test them on three others."""
+    from doorstate.cli.progress import progress_bar
+    from doorstate.networks.packaged import packaged_weights
+
+    from .sites import learning_table, measure_sites
+
+    names = weights or [DEFAULT_NETWORK]
+    paths = {
+        Path(name).stem: Path(name).absolute() if name.endswith(".safetensors") else packaged_weights(name)
+        for name in names
+    }
+    with progress_bar("sites") as progress:
+        measured = measure_sites(
+            paths, range(1, seeds + 1), count or (5, 10, 20, 50), folder, sensor, progress
+        )
+    _write(learning_table(measured), out / "sites.md", seeds=seeds, sensor=sensor)
+
+
+@app.command()
 def leveling(out: Out = Path("docs/benchmarks"), count: Count = 100) -> None:
     """Compare tilt and floor that clouds show with the true ones, for cameras level, tilted and on their side."""
     from doorstate.cli.progress import progress_bar

@@ -193,3 +193,18 @@ def test_batches_and_searches_are_on_the_device(dataset: PreparedDataset) -> Non
     tensors = [batch.points, batch.labels, *batch.neighbourhoods]
     assert {tensor.device.type for tensor in tensors} == {"meta"} == {device.type for device in searched}
     assert batch.neighbourhoods[0].dtype == torch.int64
+
+
+def test_a_share_of_an_epoch_is_from_the_own_data_set(dataset: PreparedDataset) -> None:
+    own = [dataset.sample_ids[number] for number, label in enumerate(dataset.labels) if label < 2][:5]
+    loader = CloudLoader(dataset, own, 32, extra=[(dataset, dataset.sample_ids)])
+    batches = list(loader.shuffled(8, NOTHING, (1,), limit=16, own_share=0.5))
+    repeated = list(loader.shuffled(8, NOTHING, (1,), limit=16, own_share=0.5))
+    assert all(
+        torch.equal(batch.points, again.points) for batch, again in zip(batches, repeated, strict=True)
+    )
+    assert [len(batch.labels) for batch in batches] == [8, 8]
+    drawn = loader._draw(np.random.default_rng(0), 16, None, 0.5)
+    assert (drawn < len(own)).sum() == 8
+    labels = dataset.labels[[dataset.index_of(sample) for sample in own]][drawn[drawn < len(own)]]
+    assert np.bincount(labels).tolist() == [4, 4]

@@ -232,3 +232,25 @@ def test_every_tensor_is_created_on_the_device_of_the_points(name: str, training
     assert loss.device.type == logits.device.type == "meta"
     loss.backward()
     assert all(p.grad is not None and p.grad.device.type == "meta" for p in network.parameters())
+
+
+def test_frozen_networks_learn(network: PointNetwork) -> None:
+    """Training in evaluation mode has the gradient of the loss along a random direction, and keeps the statistics."""
+    network = network.double().eval()
+    points = clouds(network.min_points, batch=2).double()
+    statistics = {name: tensor.clone() for name, tensor in network.named_buffers()}
+    network.training_loss(points, LABELS)[0].backward()
+    generator, step = torch.Generator().manual_seed(1), 1e-6
+    pairs = [
+        (parameter, torch.randn(parameter.shape, generator=generator, dtype=torch.float64))
+        for parameter in network.parameters()
+    ]
+    slope = sum(float((parameter.grad * way).sum()) for parameter, way in pairs)
+    losses = []
+    for sign in (1, -2):
+        with torch.no_grad():
+            for parameter, way in pairs:
+                parameter += sign * step * way
+            losses.append(float(network.training_loss(points, LABELS)[0]))
+    assert (losses[0] - losses[1]) / (2 * step) == pytest.approx(slope, rel=1e-2)
+    assert all(torch.equal(tensor, statistics[name]) for name, tensor in network.named_buffers())

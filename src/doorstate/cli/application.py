@@ -11,6 +11,7 @@ from typing import Annotated
 import typer
 
 from doorstate import __version__
+from doorstate.cli.adapt import adapt
 from doorstate.cli.command import Command
 from doorstate.cli.compare import compare
 from doorstate.cli.doors_app import doors_app
@@ -36,6 +37,7 @@ _COMMANDS = (
     prepare,
     join,
     train,
+    adapt,
     compare,
     report,
     resolution,

@@ -17,7 +17,7 @@ from doorstate.cli.signals import raise_in
 from doorstate.errors import ConfigError, DoorstateError, needs_extra
 
 CLOSED_PIPE = 141  # exit code of programs that SIGPIPE ends
-_RESUMABLE = {"simulate", "prepare", "train", "compare", "resolution", "transfer", "label"}
+_RESUMABLE = {"simulate", "prepare", "train", "adapt", "compare", "resolution", "transfer", "label"}
 
 
 class Command(TyperCommand):

@@ -40,7 +40,7 @@ def live_runs(
             if total > 1:
                 stderr.print(f"{done} of {total} runs finished{display.time_left()}")
 
-        with _repeated(_LOOK_PERIOD_S, lambda: epochs.print(display.time_left)):
+        with repeated(_LOOK_PERIOD_S, lambda: epochs.print(display.time_left)):
             yield print_line
         epochs.print(display.time_left)
         return
@@ -49,7 +49,7 @@ def live_runs(
 
 
 @contextmanager
-def _repeated(period_s: float, action: Callable[[], None]) -> Iterator[None]:
+def repeated(period_s: float, action: Callable[[], None]) -> Iterator[None]:
     """Call `action` periodically in a thread."""
     stopped = threading.Event()
 

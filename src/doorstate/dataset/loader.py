@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -108,7 +109,7 @@ class CloudLoader:
             stored = max(num_points, min(MOST_STORED * num_points, least))
         with_parts = PARTS in heads or (corruption is not None and corruption.mix > 0)
         loaded = [_load(source, samples, stored, heads, with_parts) for source, samples in selected]
-        self._num_points = num_points
+        self._num_points, self._num_own = num_points, len(sample_ids)
         self._points = _concatenate([samples.points for samples in loaded])
         self._normalization = dataset.normalization
         centres = _concatenate([samples.placement.centres for samples in loaded])
@@ -155,6 +156,7 @@ class CloudLoader:
         skip: int = 0,
         limit: int | None = None,
         no_door_share: float | None = None,
+        own_share: float | None = None,
         part: tuple[int, int] = (0, 1),
     ) -> Iterator[Batch]:
         """Yield one training epoch, shuffled, corrupted and augmented, without an incomplete last batch.
@@ -167,13 +169,15 @@ class CloudLoader:
             limit: number of random clouds in the epoch; None is all.
             no_door_share: share of clouds without a door in the epoch; the others, or these, are then drawn more
                 often. None: as in the data.
+            own_share: share of clouds of the first data set in the epoch, those of each label equally often;
+                `no_door_share` is then that of the rest. None: as in the data.
             part: (number, of equal parts) of each batch to yield; what is drawn does not depend on it.
         """
         rng = np.random.default_rng(seed)
-        if no_door_share is None:
+        if no_door_share is None and own_share is None:
             order = rng.permutation(len(self))[:limit]
         else:
-            order = self._draw(rng, min(len(self), limit or len(self)), no_door_share)
+            order = self._draw(rng, min(len(self), limit or len(self)), no_door_share, own_share or 0.0)
         number_of_part, parts = part
         share = min(batch_size, len(order)) // parts
         batch_size = share * parts
@@ -186,13 +190,24 @@ class CloudLoader:
                 own_losses = None if losses is None else CorruptionDraw(*(values[own] for values in losses))
                 yield self._batch(order[start : start + batch_size][own], draw.part(own), own_losses)
 
-    def _draw(self, rng: np.random.Generator, count: int, no_door_share: float) -> np.ndarray:
-        """Return the numbers of `count` samples in random order, with a share of those without a door."""
-        groups = [np.flatnonzero(~self._has_door), np.flatnonzero(self._has_door)]
-        without = round(no_door_share * count) if len(groups[0]) else 0
+    def _draw(
+        self, rng: np.random.Generator, count: int, no_door_share: float | None, own_share: float
+    ) -> np.ndarray:
+        """Return the numbers of `count` samples in random order, with shares of some kinds of them."""
+        own = round(own_share * count)
+        groups = (
+            _own_groups(self._labels[: self._num_own], self._has_door[: self._num_own], own) if own else []
+        )
+        rest = np.arange(self._num_own if own else 0, len(self))
+        if no_door_share is None:
+            groups.append((rest, count - own))
+        else:
+            without = rest[~self._has_door[rest]]
+            size = round(no_door_share * (count - own)) if len(without) else 0
+            groups += [(without, size), (rest[self._has_door[rest]], count - own - size)]
         drawn = [
             np.resize(np.concatenate([rng.permutation(group) for _ in range(1 + size // len(group))]), size)
-            for group, size in zip(groups, (without, count - without), strict=True)
+            for group, size in groups
             if size
         ]
         return rng.permutation(np.concatenate(drawn))
@@ -220,6 +235,16 @@ class CloudLoader:
             neighbours,
             on_device,
         )
+
+
+def _own_groups(
+    labels: NDArray[np.int64], has_door: NDArray[np.bool_], count: int
+) -> list[tuple[NDArray[np.int64], int]]:
+    """Return the numbers of the samples of each label, and the number of samples to draw of each: equally many."""
+    kinds = np.where(has_door, labels, len(LABELS))
+    groups = [np.flatnonzero(kinds == kind) for kind in np.unique(kinds)]
+    ends = [count * number // len(groups) for number in range(len(groups) + 1)]
+    return [(group, end - start) for group, (start, end) in zip(groups, pairwise(ends), strict=True)]
 
 
 def _concatenate(arrays: Sequence[np.ndarray]) -> np.ndarray:

@@ -7,6 +7,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 
 import pandas as pd
 
@@ -148,14 +149,11 @@ def evaluate_frames(
     readable: list[LabelledFrame] = []
     unreadable: list[tuple[LabelledFrame, str]] = []
     outputs: dict[str, list[Prediction]] = {name: [] for name in predictors}
-    of_file: tuple[str, dict[str, Prediction] | str] = (
-        "",
-        "",
-    )  # predictions of the last file, or why there are none
+    last: tuple[Path, str] | None = None
+    predictions: dict[str, Prediction] | str = ""  # of the last file, or why there are none
     for number, frame in enumerate(frames):
-        if frame.file != of_file[0]:
-            of_file = frame.file, _predict(predictors, frame)
-        predictions = of_file[1]
+        if (frame.folder, frame.file) != last:
+            last, predictions = (frame.folder, frame.file), _predict(predictors, frame)
         if isinstance(predictions, str):
             unreadable.append((frame, predictions))
         else:

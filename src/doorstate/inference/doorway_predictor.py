@@ -25,7 +25,7 @@ from doorstate.inference.backends import CloudOutputs, run_by_size
 from doorstate.inference.door import Door
 from doorstate.inference.doorway_answers import Answer, decide_doors, refused_candidate
 from doorstate.inference.doorway_check import DoorwayCheck
-from doorstate.inference.known import Known
+from doorstate.inference.known import DoorKnown, Known
 from doorstate.inference.known_doorways import hinted_doorways
 from doorstate.inference.network_predictor import NetworkPredictor
 from doorstate.inference.prediction import Prediction
@@ -80,6 +80,26 @@ class DoorwayPredictor(NetworkPredictor):
         pairs = zip(scene.doorways, scene.crops, strict=True)
         points = np.concatenate([doorway.to_sensor(crop.points) for doorway, crop in pairs])
         return PreparedCloud(points, np.concatenate([crop.indices for crop in scene.crops]))
+
+    def candidates(
+        self,
+        cloud: Points,
+        *,
+        door_known: DoorKnown = False,
+        is_level: bool = False,
+        camera_height_m: float | None = None,
+    ) -> list[tuple[Doorway, PreparedCloud]]:
+        """Return the candidate doorways and the crops that the network gets for them.
+
+        The best comes first; with a rough place, those at the place do. There are none in a cloud that is refused.
+        Arguments are those of a call.
+
+        Raises:
+            CloudContentError: as for a call.
+        """
+        known = Known(door_known, is_level, camera_height_m)
+        scene = self._search(check_single_cloud(cloud), known)
+        return list(zip(scene.doorways, scene.crops, strict=True))
 
     def _predict(self, clouds: Sequence[Points], known: Known) -> list[Prediction]:
         started = self.clock()

@@ -194,8 +194,16 @@ def _index_row(row: Row) -> dict[str, str]:
         "depth_unit_m": 0.001,
         "roll_deg": roll_deg,
         "pitch_deg": pitch_deg,
-        **({"door": row.scene_id} if row.scene_id != row.pose_id else {}),
     }
+    if row.scene_id != row.pose_id and row.scene.door is not None:  # a door that several poses show
+        values |= {
+            "door": row.scene_id,
+            "door_x_m": row.door_x_m,
+            "door_y_m": row.door_y_m,
+            "door_yaw_deg": row.door_yaw_deg,
+            "door_width_m": row.opening_width_m,
+            "door_floor_z_m": row.door_z_m,
+        }
     return {name: str(value) for name, value in values.items()}
 
 

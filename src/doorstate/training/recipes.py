@@ -41,6 +41,10 @@ class Recipe(FrozenModel):
     )  # drawn for each epoch; None: all
     # Of each epoch; None: as in the data. Most crops of doorways show none.
     no_door_share: float | None = Field(default=None, ge=0, lt=1)
+    # Of each epoch from the run's own data set, its labels equally often; the rest is from the additional ones, and
+    # `no_door_share` is of that rest. None: as in the data.
+    own_share: float | None = Field(default=None, gt=0, lt=1)
+    frozen: bool = False  # evaluation mode: running statistics stay as they are, and nothing is dropped
     batch_size: int = Field(default=16, ge=2, le=_MAX_BATCH)
     optimizer: Literal["adamw", "adam", "sgd", "muon"] = "adamw"
     learning_rate: float = Field(default=2e-3, ge=1e-12, le=_MAX_RATE)  # the highest of the schedule
@@ -72,7 +76,12 @@ class Recipe(FrozenModel):
     def _leave_out_new_fields(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
         # So that runs of earlier versions go on with the recipe that they began with.
         fields: dict[str, Any] = dump(self)
-        new = {"no_door_share": self.no_door_share is None, "corruption": self.corruption.changes_nothing}
+        new = {
+            "no_door_share": self.no_door_share is None,
+            "own_share": self.own_share is None,
+            "frozen": not self.frozen,
+            "corruption": self.corruption.changes_nothing,
+        }
         return {name: value for name, value in fields.items() if not new.get(name, False)}
 
     @field_validator("coarse_to_fine")

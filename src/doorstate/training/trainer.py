@@ -173,7 +173,7 @@ class Trainer:
             losses, rate, generator, _ = [*self.state.progress.losses], *self.state.progress[1:]
             torch.set_rng_state(generator)
             self.state.progress = None
-        self.network.train()
+        self.network.train(not recipe.frozen)
         position_s = checkpoint_s = time.perf_counter()
         for batch in loader.shuffled(
             recipe.batch_size,
@@ -182,6 +182,7 @@ class Trainer:
             skip=len(losses),
             limit=recipe.clouds_per_epoch,
             no_door_share=recipe.no_door_share,
+            own_share=recipe.own_share,
             part=self.ranks,
         ):
             rate = self.schedule.rate

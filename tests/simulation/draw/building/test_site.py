@@ -84,8 +84,8 @@ def test_depth_images_are_read_as_the_camera_tells(tmp_path) -> None:
     settings = SimulationSettings(preset=SMALL, seed=5, poses=2, raw=("depth",))
     simulate_dataset(tmp_path, settings, workers=1)
     entries = read_index(tmp_path / "depth", ReadOptions())
-    assert {line["door"] for line, _ in entries} == {"site-5-d0", "site-5-d1"}
-    line, options = entries[0]
+    assert {entry[0]["door"] for entry in entries} == {"site-5-d0", "site-5-d1"}
+    line, options = entries[0][:2]
     row = draw_rows(SMALL, 5, 0)[0]
     assert line["file"] == f"closed/{row.sample_id}.png"
     points, rendered = read_cloud(tmp_path / "depth" / line["file"], options), replay(row).points
