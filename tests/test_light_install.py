@@ -83,6 +83,8 @@ COMMANDS = {
     ("simulate", "--out", "data", "--poses", "3", "--engine", "ray"): "cluster",
     ("train", "--help"): None,
     ("train", "--network", "pointnet", "--data", "data", "--out", "run"): "train",
+    ("adapt", "labelled", "--out", "site.safetensors"): "train",
+    ("adapt", "--help"): None,
     ("compare", "experiment.toml"): "train",
     ("report", "run"): "train",
     ("resolution", "run", "--out", "study"): "train",

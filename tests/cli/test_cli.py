@@ -22,6 +22,7 @@ COMMANDS = (
     "resolution",
     "transfer",
     "predict",
+    "adapt",
     "label",
     "evaluate",
     "view",

@@ -22,7 +22,7 @@ COMMANDS: dict[str, Any] = named_commands()
 # Options that name another thing in other commands, and say so in their help.
 SEVERAL_MEANINGS = {
     *("--out", "--seed", "--workers", "--points", "--network", "--data", "--port"),
-    *("--poses", "--doors"),
+    *("--poses", "--doors", "--weights"),
 }
 RAISING = re.compile(r"(Error|missing_extra|unknown_name|error|Abstention)$")
 _FLAG = re.compile(r"(^|\W)--[a-z]")
