@@ -6,6 +6,7 @@
 # make report: tables, figures and report of EXPERIMENT from results/ into build/;
 # make reproduce-check: compare all published tables with those that the committed predictions give;
 # make lock: versions and hashes of all packages (OPTIONS=--upgrade: the newest); make audit: known vulnerabilities in them, and faults of the workflows;
+# make container: the image of the service and MQTT, started and asked (needs docker);
 # make dist: wheel, sdist and the wheel's bill of materials, in dist/.
 VENV := .venv
 BIN := $(VENV)/bin
@@ -14,7 +15,7 @@ RELEASE := build/release
 
 EXPERIMENT := paper
 
-.PHONY: setup check test test-ros2 docs demo fresh-install reproduce publish report reproduce-check lock audit dist clean
+.PHONY: setup check test test-ros2 docs demo fresh-install reproduce publish report reproduce-check lock audit dist container clean
 
 setup: $(VENV)/.complete
 
@@ -73,6 +74,9 @@ audit: $(RELEASE)/.complete
 
 dist: $(RELEASE)/.complete
 	bash tools/dist.sh $(RELEASE) dist
+
+container:
+	bash tools/container.sh
 
 clean:
 	rm -rf $(VENV) $(VENV)-ros2 $(DEMO) build dist

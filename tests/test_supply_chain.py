@@ -20,7 +20,13 @@ from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-LOCKS = ("requirements.lock", "requirements-light.lock", "tools/release.lock", "ros2/requirements.lock")
+LOCKS = (
+    "requirements.lock",
+    "requirements-light.lock",
+    "requirements-container.lock",
+    "tools/release.lock",
+    "ros2/requirements.lock",
+)
 WORKFLOWS = sorted((ROOT / ".github/workflows").glob("*.yml"))
 PAGES = [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *(ROOT / "ros2").rglob("*.md")]
 
@@ -70,7 +76,12 @@ def test_every_locked_package_has_one_version_and_its_sums(lock: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("lock", "extras"), [("requirements.lock", ["dev", "fast"]), ("requirements-light.lock", [])]
+    ("lock", "extras"),
+    [
+        ("requirements.lock", ["dev", "fast"]),
+        ("requirements-light.lock", []),
+        ("requirements-container.lock", ["serve", "mqtt"]),
+    ],
 )
 def test_exactly_what_the_project_needs_is_locked(lock: str, extras: list[str]) -> None:
     here = {entry.name for entry in locked(lock) if entry.marker is None or entry.marker.evaluate()}
@@ -82,7 +93,7 @@ def test_exactly_what_the_project_needs_is_locked(lock: str, extras: list[str]) 
 def test_locks_agree_and_fit_the_project() -> None:
     everything = {str(entry): sums for entry, sums in locked("requirements.lock").items()}
     versions = {entry.name: entry.specifier for entry in locked("requirements.lock")}
-    for entry, sums in locked("requirements-light.lock").items():
+    for entry, sums in (locked("requirements-light.lock") | locked("requirements-container.lock")).items():
         assert (entry.specifier, sums) == (versions[entry.name], sums)
         if str(entry) in everything:
             assert sums == everything[str(entry)]

@@ -13,7 +13,13 @@ import tempfile
 from pathlib import Path
 
 REPOSITORY = Path(__file__).resolve().parents[1]
-LOCKS = ("requirements.lock", "requirements-light.lock", "ros2/requirements.lock", "tools/release.lock")
+LOCKS = (
+    "requirements.lock",
+    "requirements-light.lock",
+    "requirements-container.lock",
+    "ros2/requirements.lock",
+    "tools/release.lock",
+)
 
 
 def main() -> None:

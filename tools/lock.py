@@ -21,6 +21,7 @@ _ANY_PLATFORM = ("--universal", "--fork-strategy", "fewest")
 PARTS = {  # in the versions of requirements.lock
     "tools/release.lock": ("--group", "release", *_ANY_PLATFORM),
     "requirements-light.lock": ("pyproject.toml", *_ANY_PLATFORM),
+    "requirements-container.lock": ("pyproject.toml", "--extra", "serve", "--extra", "mqtt", *_ANY_PLATFORM),
     "ros2/requirements.lock": ("ros2/requirements.txt", "--python-platform", "x86_64-manylinux_2_28"),
 }
 _OPTIONAL = "# optional: "  # tools/setup.sh reads this comment
