@@ -8,6 +8,7 @@ import signal
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 import torch
@@ -29,6 +30,9 @@ from doorstate.simulation.settings import SimulationSettings
 from doorstate.simulation.writer import simulate_dataset
 
 pytest_plugins = ["tests._jobs.engines"]
+if TYPE_CHECKING:
+    from tests.mqtt.broker import Broker
+
 SMALL_POINTS = 160
 Run = Callable[..., tuple[int, str, str]]
 
@@ -106,6 +110,18 @@ def weights(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("weights") / "pointnet.safetensors"
     save_weights(path, create_network("pointnet"), WeightsCard(network="pointnet", num_points=256))
     return path
+
+
+@pytest.fixture
+def broker(tmp_path: Path) -> Iterator[Broker]:
+    """A broker of MQTT without users."""
+    from tests.mqtt.broker import MOSQUITTO, Broker
+
+    if MOSQUITTO is None:
+        pytest.skip("mosquitto is not installed")
+    started = Broker(tmp_path)
+    yield started
+    started.kill()
 
 
 @pytest.fixture

@@ -76,27 +76,21 @@ def recording(frames: list[Frame], tmp_path: Path) -> Path:
     return folder
 
 
-def test_a_live_stream_is_published_and_its_end_too(recording: Path, tmp_path: Path) -> None:
-    broker = Broker(tmp_path)
+def test_a_live_stream_is_published_and_its_end_too(recording: Path, broker: Broker) -> None:
     command = [sys.executable, "-m", "doorstate", "view", "--live", recording, "--rate", "10", "--no-open"]
     mqtt = ["--mqtt", f"mqtt://127.0.0.1:{broker.port}", "--mqtt-camera", "hall", "--mqtt-expire-s", "3"]
-    try:
-        with listening(broker.port) as listener:
-            program = subprocess.Popen([*command, "--rule", "plane_state", *mqtt], stdout=subprocess.DEVNULL)
-            try:
-                wait_until(
-                    lambda: listener.last(STATE) == "open" and listener.last(AVAILABILITY) == "online", 20
-                )
-                attributes = json.loads(listener.last("doorstate/hall/door/attributes") or "")
-                assert attributes["probability"] >= 0.8
-                assert listener.of(STATE)[0] == "unknown"
-            finally:
-                program.kill()
-                program.wait()
-            wait_until(lambda: listener.last(AVAILABILITY) == "offline")  # the last will
-        wait_until(lambda: time.sleep(0.5) or is_forgotten(broker))  # type: ignore[func-returns-value]
-    finally:
-        broker.kill()
+    with listening(broker.port) as listener:
+        program = subprocess.Popen([*command, "--rule", "plane_state", *mqtt], stdout=subprocess.DEVNULL)
+        try:
+            wait_until(lambda: listener.last(STATE) == "open" and listener.last(AVAILABILITY) == "online", 20)
+            attributes = json.loads(listener.last("doorstate/hall/door/attributes") or "")
+            assert attributes["probability"] >= 0.8
+            assert listener.of(STATE)[0] == "unknown"
+        finally:
+            program.kill()
+            program.wait()
+        wait_until(lambda: listener.last(AVAILABILITY) == "offline")  # the last will
+    wait_until(lambda: time.sleep(0.5) or is_forgotten(broker))  # type: ignore[func-returns-value]
 
 
 def is_forgotten(broker: Broker) -> bool:
@@ -105,6 +99,18 @@ def is_forgotten(broker: Broker) -> bool:
         wait_until(lambda: late.last(AVAILABILITY) == "offline")
         time.sleep(0.1)
         return late.of(STATE) == []
+
+
+def test_watch_publishes_and_its_end_is_said(broker: Broker, run: Run, weights: Path) -> None:
+    camera = ("--camera", "simulated", "--size", "64x48", "--fps", 20, "--seconds", 1.5, "--weights", weights)
+    with listening(broker.port) as listener:
+        code, _, errors = run(
+            "watch", *camera, "--mqtt", f"mqtt://127.0.0.1:{broker.port}", "--mqtt-camera", "hall"
+        )
+        assert code == 0
+        wait_until(lambda: listener.of(AVAILABILITY) == ["offline", "online", "offline"])
+        wait_until(lambda: listener.last(STATE) == "unknown")
+    assert "mqtt: connected" in errors
 
 
 def test_a_wrong_password_is_one_line(

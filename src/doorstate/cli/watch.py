@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from doorstate.cli.choices import CAMERA
+from doorstate.cli.mqtt_options import MqttOptions, with_mqtt_options
 from doorstate.cli.options import (
     AsJson,
     BudgetMs,
@@ -28,16 +29,18 @@ from doorstate.cli.reading_options import CameraHeight, Pitch, Roll
 from doorstate.errors import ConfigError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Iterator
 
     from doorstate.cameras.device import DepthFrame
     from doorstate.cameras.grabber import FrameGrabber
     from doorstate.cameras.watcher import CameraReport
     from doorstate.cli.watch_output import Show
+    from doorstate.mqtt.publisher import MqttPublisher
 
 _SIZE = re.compile(r"(\d{1,5})x(\d{1,5})")
 
 
+@with_mqtt_options
 def watch(
     camera: Annotated[
         str | None,
@@ -92,6 +95,8 @@ def watch(
         float | None,
         typer.Option(help="Stop after this time. [default: at Ctrl-C]", min=0.1, show_default=False),
     ] = None,
+    *,
+    mqtt: MqttOptions,
 ) -> None:
     """Watch over a door with a depth camera that is attached to this machine.
 
@@ -105,6 +110,7 @@ def watch(
       doorstate watch --camera oak --view
       doorstate watch --camera orbbec --serial CP12345 --json
       doorstate watch --camera simulated --serial loose-cable --view --no-open
+      doorstate watch --camera realsense --mqtt mqtts://robot@broker.local --mqtt-camera hall
     """
     from doorstate.cameras.clock import DayTime
     from doorstate.cameras.device import CameraRequest
@@ -154,11 +160,23 @@ def watch(
             Methods(network, weights, rule), points, budget_ms=budget_ms, threads=threads
         )
         watched = CameraWatch(settings, predictor, accelerometer=accelerometer, day_time=day_time)
+        publisher = stack.enter_context(mqtt.open())
         with show_reports(
             predictor, as_json=as_json, view=view, port=port, open_browser=open_browser
         ) as show:
-            answered = _follow(watched.follow(grabber), show, seconds)
+            answered = _follow(_publish(watched.follow(grabber), publisher), show, seconds)
     _print_end(grabber, answered, None if recorder is None else recorder.frames, record)
+
+
+def _publish(reports: Iterable[CameraReport], publisher: MqttPublisher | None) -> Iterator[CameraReport]:
+    """Yield the reports, and publish those of frames; a camera that sends none becomes offline."""
+    from doorstate.mqtt.status import status_of_front_door
+
+    for report in reports:
+        if publisher is not None and report.frame is not None:
+            status = status_of_front_door(report.door.prediction, report.door.filtered)
+            publisher.update([status], report.latency_s)
+        yield report
 
 
 def _follow(reports: Iterable[CameraReport], show: Show, seconds: float | None) -> int:

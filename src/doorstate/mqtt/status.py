@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
+from doorstate.doors.sighting import Sighting
 from doorstate.inference.prediction import Prediction
 from doorstate.inference.serialization import door_to_dict, prediction_to_dict
 from doorstate.inference.state_filter import FilteredState
@@ -41,3 +42,12 @@ def status_of_front_door(
     if filtered.state is not None:
         details["probability"] = round(filtered.probabilities[filtered.state], 4)
     return DoorStatus(name, filtered.state, details)
+
+
+def status_of_sighting(sighting: Sighting) -> DoorStatus:
+    """Return the status of a door of a list: its state by the filter while it is seen, else None with the reason."""
+    filtered = sighting.filtered
+    details = {key: value for key, value in sighting.to_dict().items() if key not in _NOT_SENT}
+    if filtered is not None and filtered.state is not None:
+        details["probability"] = round(filtered.probabilities[filtered.state], 4)
+    return DoorStatus(sighting.id, None if filtered is None else filtered.state, details)
