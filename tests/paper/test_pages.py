@@ -76,4 +76,5 @@ def test_the_readme_has_the_scores_on_recorded_frames() -> None:
 # The reference of commands has a line for each option.
 @pytest.mark.parametrize("name", sorted({*PAGES, "limits"} - {"commands"}))
 def test_a_page_is_short(name: str) -> None:
-    assert len((DOCS / f"{name}.md").read_text(encoding="utf-8").splitlines()) <= 165
+    most = 250 if name == "commands" else 165  # a line for each option
+    assert len((DOCS / f"{name}.md").read_text(encoding="utf-8").splitlines()) <= most
