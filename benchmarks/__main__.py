@@ -199,6 +199,21 @@ def simulation(
     store_results(out, "batched_rendering", rendered, table, device=device, threads=threads)
 
 
+@app.command("live-camera")
+def live_camera(
+    out: Out,
+    hours: Annotated[float, typer.Option(help="Time that passes for the camera.", min=0.001)] = 24.0,
+    fps: Annotated[int, typer.Option(help="Images a second.", min=1)] = 30,
+) -> None:
+    """Memory of a long watch by a live camera, whose time passes as fast as images can be taken."""
+    from benchmarks.live_camera import LongWatch, live_camera_table, measure_live_camera
+    from doorstate.cli.progress import progress_bar
+
+    with progress_bar("live-camera") as progress:
+        rows = measure_live_camera(LongWatch(hours, fps), progress)
+    store_results(out, "live-camera", rows, live_camera_table(rows), hours=hours, fps=fps)
+
+
 @app.command()
 def busy(
     out: Out,

@@ -212,6 +212,16 @@ def test_time_of_a_simulated_frame_is_the_sum_of_its_stages(tmp_path: Path) -> N
     assert all(batch["frames_per_s"] > 0 for batch in batches)
 
 
+def test_a_long_watch_has_a_row_for_each_eighth(tmp_path: Path) -> None:
+    assert run("live-camera", "--out", tmp_path, "--hours", "0.05")[0] == 0
+    _, rows, markdown = read_results(tmp_path, "live-camera")
+    assert len(rows) == 8
+    assert rows[-1]["grabbed"] > 0.05 * 3600 * 30 - 10 > rows[0]["grabbed"]
+    assert rows[-1]["answered"] > 0
+    assert rows[-1]["resident_mib"] > 10
+    assert markdown.count("\n| ") >= 8
+
+
 def test_busy_has_a_row_for_every_form_and_number_of_processes(tmp_path: Path) -> None:
     few = ("--runtimes", "onnxruntime", "--threads", "1,2", "--processes", "0,1", "--repeats", "1")
     assert run("busy", "--out", tmp_path, *few)[0] == 0

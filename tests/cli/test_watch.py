@@ -21,11 +21,12 @@ import pytest
 from rich.console import Console
 
 from doorstate.cameras import registry
-from doorstate.cameras.clock import DayTime
+from doorstate.cameras.clock import DayTime, steady_s
 from doorstate.cameras.grabber import Counts
 from doorstate.cameras.watcher import CameraWatch, Notice
 from doorstate.cli import watch_output
 from doorstate.cli.depth_picture import depth_picture, depth_pixels, draw_line
+from doorstate.cli.watch import _publish
 from doorstate.inference.door import Door
 from doorstate.inference.door_lines import Line
 from doorstate.inference.prediction import Prediction
@@ -206,6 +207,39 @@ def test_the_terminal_shows_picture_state_doors_and_notices() -> None:
     assert "dropped 1 of 3" in text
     assert "+2.0 s" in text
     assert "accelerometer" in text
+
+
+def test_a_high_terminal_has_the_doors_from_above() -> None:
+    door = Door(
+        2.0, 0.4, 90.0, 0.9, DoorState.OPEN, opening_angle_deg=90.0, hinge="left", passable_width_m=0.8
+    )
+    report = one_report()
+    seen = replace(report, door=replace(report.door, prediction=Prediction.from_doors([door], [], 100, 1.0)))
+    assert [line.plain for line in watch_output._doors(seen, 24)] == [
+        "  1  open 90°, passable 0.80 m, 2.0 m, 11° left"
+    ]
+    assert len(watch_output._doors(seen, 50)) > 5
+
+
+class Publisher:
+    """Publisher that keeps what it is told."""
+
+    def __init__(self) -> None:
+        self.told: list[tuple[Any, float]] = []
+
+    def update(self, statuses: list[Any], age_s: float) -> None:
+        self.told += [(status.state, age_s) for status in statuses]
+
+
+def test_a_camera_that_is_gone_is_published_once_as_unknown() -> None:
+    watch = CameraWatch(WatchSettings(require_leaf=False), FixedPredictor(DoorState.OPEN))
+    publisher, start_s = Publisher(), steady_s() - 2.5
+    reports = [watch.answer(frame(number, start_s + number / 10), Counts()) for number in range(25)]
+    reports += [watch.report_gone("unplugged", Counts()) for _ in range(3)]
+    assert list(_publish(reports, publisher)) == reports  # type: ignore[arg-type]
+    assert [state for state, _ in publisher.told[-2:]] == [DoorState.OPEN, None]
+    assert len(publisher.told) == 26
+    assert publisher.told[0][1] == reports[0].latency_s > 2, "the age of the image"
 
 
 def test_near_is_bright_far_is_dark_and_nothing_is_black() -> None:

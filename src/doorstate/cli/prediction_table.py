@@ -75,6 +75,31 @@ _CELLS_WIDTH = (
 )
 
 
+def door_drawing(doors: Sequence[dict[str, Any]]) -> list[Text]:
+    """Return all doors from above, the robot at the foot, and what is known of each beside them.
+
+    Args:
+        doors: doors as `door_to_dict` returns them; no lines where the output has no signs.
+    """
+    if not _has_signs():
+        return []
+    drawing = plan_text(plan_of_record(doors))
+    notes = [note for number, door in enumerate(doors, 1) for note in _notes(number, door, len(doors))]
+    lines = []
+    for row in range(max(len(drawing.lines), len(notes))):
+        blank = " " * len(drawing.lines[0])
+        line = Text("  " + (drawing.lines[row] if row < len(drawing.lines) else blank))
+        for mark in drawing.marks:
+            if mark.row == row:
+                style = STATE_STYLES.get(doors[mark.door]["state"], "bold")
+                line.stylize(style, mark.column + 2, mark.column + 2 + mark.length)
+        if row < len(notes):
+            line.append(_GAP + notes[row][0], notes[row][1])
+        line.rstrip()
+        lines.append(line)
+    return lines
+
+
 class PredictionTable:
     """Prints predictions on standard output.
 
@@ -125,7 +150,8 @@ class PredictionTable:
         for line in _not_seen(row.get("named_doors", ())):
             self._print_reason(printable(line))
         if self._draws and doors:
-            self._print_drawing(doors)
+            for drawn in door_drawing(doors):
+                console.stdout.print(drawn)
 
     def _print_answer(self, name: str, answer: dict[str, Any]) -> None:
         """Print a prediction, or one of its further doors."""
@@ -147,24 +173,6 @@ class PredictionTable:
         ]
         titles += [f"{column.title:>{column.width}}" for column in _COLUMNS]
         console.stdout.print(_GAP.join(titles), style="bold underline")
-
-    def _print_drawing(self, doors: Sequence[dict[str, Any]]) -> None:
-        """Print all doors from above, the robot at the foot, and what is known of each beside them."""
-        if not _has_signs():
-            return
-        drawing = plan_text(plan_of_record(doors))
-        notes = [note for number, door in enumerate(doors, 1) for note in _notes(number, door, len(doors))]
-        for row in range(max(len(drawing.lines), len(notes))):
-            blank = " " * len(drawing.lines[0])
-            line = Text("  " + (drawing.lines[row] if row < len(drawing.lines) else blank))
-            for mark in drawing.marks:
-                if mark.row == row:
-                    style = STATE_STYLES.get(doors[mark.door]["state"], "bold")
-                    line.stylize(style, mark.column + 2, mark.column + 2 + mark.length)
-            if row < len(notes):
-                line.append(_GAP + notes[row][0], notes[row][1])
-            line.rstrip()
-            console.stdout.print(line)
 
     def _print_reason(self, reason: str) -> None:
         indent = "    " if self._by_method else "  "

@@ -169,11 +169,12 @@ def watch(
 
 
 def _publish(reports: Iterable[CameraReport], publisher: MqttPublisher | None) -> Iterator[CameraReport]:
-    """Yield the reports, and publish those of frames; a camera that sends none becomes offline."""
+    """Yield the reports, and publish those of frames; a camera that is gone is unknown at once, and then offline."""
     from doorstate.mqtt.status import status_of_front_door
 
     for report in reports:
-        if publisher is not None and report.frame is not None:
+        is_news = report.frame is not None or any(notice.code == "camera_gone" for notice in report.notices)
+        if publisher is not None and is_news:
             status = status_of_front_door(report.door.prediction, report.door.filtered)
             publisher.update([status], report.latency_s)
         yield report

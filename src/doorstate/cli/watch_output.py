@@ -15,7 +15,7 @@ from rich.text import Text
 
 from doorstate.cli import console
 from doorstate.cli.flags import format_flag
-from doorstate.cli.prediction_table import STATE_STYLES, side_of
+from doorstate.cli.prediction_table import STATE_STYLES, door_drawing, side_of
 from doorstate.types import DoorState
 
 if TYPE_CHECKING:
@@ -27,7 +27,8 @@ Show = Callable[["CameraReport"], None]
 
 _PERIOD_S = 0.2  # between pictures in terminal and browser
 _PICTURE_COLUMNS = 80
-_TEXT_ROWS = 8  # below the picture
+_TEXT_ROWS = 7  # below the picture, without the doors
+_ROWS_OF_DRAWING = 38  # of a terminal that has room for picture and plan
 _WORDS = {
     "camera_opened": "camera",
     "camera_gone": "no camera",
@@ -104,18 +105,31 @@ def describe(report: CameraReport) -> Group:
     door = report.door
     parts: list[Text] = []
     width, height = console.stdout.size
+    doors = _doors(report, height)
     if report.frame is not None:
-        rows = max(4, height - _TEXT_ROWS - len(door.prediction.doors))
+        rows = max(4, height - _TEXT_ROWS - len(doors))
         parts.append(depth_picture(report.frame, door, min(width, _PICTURE_COLUMNS), rows))
     parts.append(Text(_over_time(report), STATE_STYLES.get(door.state, "bold")))
-    for number, one in enumerate(door.prediction.doors, 1):
-        parts.append(Text(f"  {number}  {_door_text(one)}", STATE_STYLES.get(str(one.state), "")))
+    parts += doors
     if reason := door.prediction.reason:
         parts.append(Text(f"  {reason}", "dim"))
     counts = report.counts
     facts = [_tilt(report), _latency(report), f"dropped {counts.dropped} of {counts.grabbed}"]
     parts.append(Text(" · ".join(filter(None, facts)), "dim"))
     return Group(*parts, *(Text(_notice_text(notice), "yellow") for notice in report.notices))
+
+
+def _doors(report: CameraReport, height: int) -> list[Text]:
+    """Return the doors from above where there is room, else a line for each."""
+    from doorstate.inference.serialization import door_to_dict
+
+    doors = report.door.prediction.doors
+    if doors and height >= _ROWS_OF_DRAWING and (drawing := door_drawing([*map(door_to_dict, doors)])):
+        return drawing
+    return [
+        Text(f"  {number}  {_door_text(one)}", STATE_STYLES.get(str(one.state), ""))
+        for number, one in enumerate(doors, 1)
+    ]
 
 
 def _limited(show: Show) -> Show:
