@@ -68,6 +68,8 @@ def test_old_clouds_are_no_news() -> None:
     assert board.take_due(0.0) == [Message(AVAILABILITY, "offline")]
     board.update([OPEN], 1.0, 4.0)
     assert board.take_due(1.0)[-2] == Message(STATE, "open", 11.0)
+    board.update([CLOSED], 1.5, 4.6)  # was overtaken
+    assert board.take_due(1.5) == []
     assert texts(board.take_due(2.5))[STATE] == "unknown"  # five seconds after it was taken
 
 

@@ -4,7 +4,9 @@
 from __future__ import annotations
 
 import json
+import socket
 import subprocess
+import threading
 import time
 from pathlib import Path
 
@@ -112,6 +114,28 @@ def test_a_broker_that_comes_later_is_found(broker: Broker) -> None:
         assert "has no connection" in lines[0]
         broker.start()
         wait_until(lambda: publisher.is_connected)
+
+
+def test_what_is_no_broker_ends_nothing() -> None:
+    lines: list[str] = []
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        publisher = MqttPublisher(settings(server.getsockname()[1]), lines.append)
+        with pytest.raises(BrokerError):
+            publisher.update([OPEN])
+        answer = threading.Thread(target=answer_garbage, args=(server,))
+        answer.start()
+        with publisher:
+            wait_until(lambda: sum("has no connection" in line for line in lines) >= 1)
+            publisher.update([OPEN])
+            assert not publisher.is_connected
+        answer.join()
+
+
+def answer_garbage(server: socket.socket) -> None:
+    connection, _ = server.accept()
+    with connection:
+        connection.sendall(b"HTTP/1.1 400 Bad Request\r\n\r\n" + bytes(range(256)) * 4)
+        time.sleep(0.3)
 
 
 def test_users_and_passwords(tmp_path: Path) -> None:

@@ -77,6 +77,8 @@ class DoorBoard:
                 check_level(status.door)
                 _check_count(len(self._entries))
                 entry = self._entries[status.door] = _Entry(status, taken_s)
+            if taken_s < entry.confirmed_s:  # a newer cloud was faster
+                continue
             entry.status, entry.confirmed_s = status, taken_s
             if status.state is not None:
                 entry.seen = datetime.now(UTC) - timedelta(seconds=age_s)

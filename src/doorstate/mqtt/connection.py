@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from doorstate.errors import BrokerError, needs_extra
+from doorstate.errors import BrokerError, needs_extra, summarize_exception
 from doorstate.mqtt.settings import MqttSettings
 from doorstate.mqtt.topics import OFFLINE, Message, availability_topic, identifier
 
@@ -107,7 +107,11 @@ class Connection:
         if now_s > self._deadline_s:
             self._lose(now_s, "no answer")
             return True
-        code = self._client.loop(timeout_s)
+        try:
+            code = self._client.loop(timeout_s)
+        except Exception as error:  # of any type, for bytes that are no MQTT
+            self._lose(now_s, summarize_exception(error))
+            return True
         if code != MQTTErrorCode.MQTT_ERR_SUCCESS or not self._is_open:
             is_short = self.is_up and now_s - self._up_s < _SHORT_S
             self._lose(now_s, self._reason or (_SAME_NAME if is_short else paho.error_string(code)))

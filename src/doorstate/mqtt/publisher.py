@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable
 from types import TracebackType
 from typing import Self
 
+from doorstate.cameras.clock import steady_s
 from doorstate.errors import BrokerError
 from doorstate.mqtt.board import DoorBoard
 from doorstate.mqtt.connection import CONNECT_TIMEOUT_S, Connection
@@ -33,7 +34,7 @@ class MqttPublisher:
     Args:
         settings: broker, camera and times.
         notify: gets one line about the connection, or a silent camera; called by the publisher's thread.
-        clock: seconds of a clock that is never set, for silence and expiry.
+        clock: seconds of a clock that is never set, and goes on while the machine sleeps, for silence and expiry.
 
     Raises:
         MissingExtraError: paho-mqtt is not installed.
@@ -45,7 +46,7 @@ class MqttPublisher:
         self,
         settings: MqttSettings,
         notify: Callable[[str], None] = _ignore,
-        clock: Callable[[], float] = time.monotonic,
+        clock: Callable[[], float] = steady_s,
     ) -> None:
         self._settings, self._notify, self._clock = settings, notify, clock
         self._lock = threading.Lock()
@@ -84,8 +85,11 @@ class MqttPublisher:
             age_s: age of the cloud in seconds; an old one is no news.
 
         Raises:
+            BrokerError: the publisher was not entered, or was left.
             ConfigError: the name of a door cannot be part of a topic.
         """
+        if not self._thread.is_alive():
+            raise BrokerError("the publisher is not running")
         with self._lock:
             self._board.update(statuses, self._clock(), age_s)
 
