@@ -127,7 +127,7 @@ class Connection:
 
     def finish(self, messages: Iterable[Message]) -> None:
         """Send the last messages, if the network takes them in time, and end the connection without the last will."""
-        for message in messages:
+        for message in messages if self.is_up else ():
             self.send(message)
         deadline_s = time.monotonic() + _FINISH_S
         while self._is_open and self._client.want_write() and time.monotonic() < deadline_s:

@@ -106,10 +106,9 @@ class MqttPublisher:
             self._note_first_attempt()
             self._say_if_silent()
             self._send_due()
-        if connection.is_up:
-            with self._lock:
-                messages = self._board.close(self._clock())
-            connection.finish(messages)
+        with self._lock:
+            messages = self._board.close(self._clock())
+        connection.finish(messages)
 
     def _note_first_attempt(self) -> None:
         if not self._tried.is_set() and (self._connection.is_up or not self._connection.is_connecting):
