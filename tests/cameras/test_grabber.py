@@ -75,8 +75,10 @@ def test_a_silent_camera_is_opened_again() -> None:
 
 
 def test_a_camera_that_is_not_there_at_the_start_is_an_error() -> None:
-    with pytest.raises(CameraGoneError), FrameGrabber(ScriptedCamera([ABSENT])):
+    camera = ScriptedCamera([ABSENT])
+    with pytest.raises(CameraGoneError), FrameGrabber(camera):
         pass
+    assert camera.closed == 1
 
 
 def test_what_recording_raises_ends_the_waiting() -> None:

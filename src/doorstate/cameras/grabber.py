@@ -84,7 +84,11 @@ class FrameGrabber:
         self._thread = threading.Thread(target=self._run, name="camera", daemon=True)
 
     def __enter__(self) -> Self:
-        self._events.append(Opened(self._device.open(self._request)))
+        try:
+            self._events.append(Opened(self._device.open(self._request)))
+        except BaseException:
+            self._device.close()  # it may have been opened in part
+            raise
         self._thread.start()
         return self
 
