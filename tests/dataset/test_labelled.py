@@ -54,7 +54,7 @@ def test_labels_of_folders(tmp_path: Path) -> None:
         ("no door/b.xyz", "no_door"),
         ("closed/none/d.xyz", "no_door"),
     }
-    np.testing.assert_array_equal(frames[0].read(), [[1, 2, 3], [4, 5, 6]])
+    np.testing.assert_array_equal(frames[0].read().points, [[1, 2, 3], [4, 5, 6]])
 
 
 def test_folders_without_labels_are_refused(tmp_path: Path) -> None:
@@ -86,7 +86,7 @@ def test_the_index_overrides_the_read_options_of_its_files(tmp_path: Path) -> No
         ("openings", "hall"),
     ]
     assert "state" not in frames[0].columns
-    own, of_all, optical = (frame.read() for frame in frames)
+    own, of_all, optical = (frame.read().points for frame in frames)
     np.testing.assert_allclose(own[0, 0], [2.0, 2 * 2.5 / 8, 2 * 1.5 / 8])
     np.testing.assert_allclose(of_all[0, 0], [0.8, -0.8 * 2.5 / 4, -0.8 * 1.5 / 4])
     np.testing.assert_allclose(optical[0], [3, -1, -2])
@@ -146,4 +146,14 @@ def test_the_recorded_frames_can_be_read() -> None:
     labels = {frame.label for frame in frames}
     assert {*STATES, NO_DOOR} <= labels
     assert len({frame.file for frame in frames}) == len(frames)
-    assert frames[0].read().shape[-1] == 3
+    assert frames[0].read().points.shape[-1] == 3
+
+
+def test_a_frame_tells_whether_its_tilt_is_known(tmp_path: Path) -> None:
+    for name in "ab":
+        np.savetxt(tmp_path / f"{name}.xyz", np.eye(3))
+    index(tmp_path, "file,state,pitch_deg,camera_height_m\na.xyz,open,10,0.5\nb.xyz,open,,\n")
+    tilted, unknown = (frame.read().pose for frame in labelled_frames(tmp_path))
+    assert (tilted.is_tilt_known, tilted.pitch_deg, tilted.camera_height_m) == (True, 10, 0.5)
+    assert not unknown.is_tilt_known
+    assert unknown.camera_height_m is None

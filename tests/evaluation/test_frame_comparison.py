@@ -18,6 +18,7 @@ from doorstate.evaluation.frames import FrameResults, default_group
 from doorstate.evaluation.intervals import bootstrap_mean, grouped_interval
 from doorstate.inference.abstention import Abstention
 from doorstate.inference.prediction import Prediction
+from doorstate.io.sensor_pose import PosedCloud, camera_pose
 from doorstate.types import ABSTAINED, DoorState
 from doorstate.viewer.frame_page import choose_frames
 
@@ -44,7 +45,7 @@ def results() -> FrameResults:
             label,
             {"door": DOORS[k], "moment": MOMENTS[k]},
             Path(),
-            lambda: np.ones((9, 3), np.float32),
+            lambda: PosedCloud(np.ones((9, 3), np.float32), camera_pose("ros", tilt_from="assumed")),
         )
         for k, label in enumerate(LABELS)
     )

@@ -14,7 +14,7 @@ from doorstate.dataset.labelled import LabelledFrame
 from doorstate.evaluation import frame_pieces
 from doorstate.evaluation.frame_pieces import PredictorArguments, evaluate_frames_in_pieces
 from doorstate.evaluation.frames import evaluate_frames
-from doorstate.io.readers import read_cloud
+from doorstate.io.readers import read_posed_cloud
 from doorstate.simulation.frames import Frame
 from doorstate.types import STATES
 
@@ -27,7 +27,9 @@ def test_pieces_give_the_results_of_one_process(
         path = tmp_path / f"{number}.npy"
         if number != 4:  # which cannot be read
             np.save(path, frame.points)
-        labelled.append(LabelledFrame(path.name, state, {"door": "oak"}, tmp_path, partial(read_cloud, path)))
+        labelled.append(
+            LabelledFrame(path.name, state, {"door": "oak"}, tmp_path, partial(read_posed_cloud, path))
+        )
     methods = PredictorArguments({"net": {"name_or_path": weights}, "plane_state": {"rule": "plane_state"}})
     monkeypatch.setattr(frame_pieces, "_FRAMES_PER_PIECE", 2)
     steps: list[tuple[int, int]] = []

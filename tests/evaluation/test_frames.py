@@ -15,8 +15,9 @@ from doorstate.dataset.labelled import LabelledFrame
 from doorstate.errors import CloudReadError, ConfigError
 from doorstate.evaluation.frames import FrameResults, Predictors, evaluate_frames
 from doorstate.inference.predictor import Predictor
+from doorstate.io.sensor_pose import PosedCloud, camera_pose
 from doorstate.simulation.frames import Frame
-from doorstate.types import ABSTAINED, STATES, Points
+from doorstate.types import ABSTAINED, STATES
 from doorstate.viewer.frame_page import choose_frames
 
 
@@ -25,7 +26,7 @@ def predictors(weights: Path) -> Predictors:
     return {"net": Predictor.load(weights), "plane_state": Predictor.load(rule="plane_state")}
 
 
-def broken() -> Points:
+def broken() -> PosedCloud:
     raise CloudReadError("is not a PCD file", path="d.pcd")
 
 
@@ -39,13 +40,24 @@ def labelled(frames: list[Frame]) -> list[LabelledFrame]:
         return LabelledFrame(name, label, columns, Path(), read)  # type: ignore[arg-type]
 
     doors = [
-        frame(f"{state}.pcd", state, partial(np.copy, cloud), door="wood", light="dim")
+        frame(
+            f"{state}.pcd",
+            state,
+            partial(PosedCloud, cloud, camera_pose("ros", tilt_from="assumed")),
+            door="wood",
+            light="dim",
+        )
         for state, cloud in zip(STATES, clouds, strict=True)
     ]
     return [
         *doors,
-        frame("wall.pcd", "no_door", partial(np.copy, clouds[0])),
-        frame("tiny.pcd", "open", partial(np.copy, tiny), door="wood and GLASS"),
+        frame("wall.pcd", "no_door", partial(PosedCloud, clouds[0], camera_pose("ros", tilt_from="assumed"))),
+        frame(
+            "tiny.pcd",
+            "open",
+            partial(PosedCloud, tiny, camera_pose("ros", tilt_from="assumed")),
+            door="wood and GLASS",
+        ),
         frame("broken.pcd", "open", broken),
     ]
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import cast
 
@@ -18,6 +19,7 @@ from doorstate.inference.abstention import Abstention
 from doorstate.inference.door import Door
 from doorstate.inference.prediction import Prediction
 from doorstate.inference.predictor import Predictor
+from doorstate.io.sensor_pose import PosedCloud, camera_pose
 from doorstate.types import DoorState, Points
 
 LEFT, RIGHT = Doorway(3, 1, 90, 0.9, -1), Doorway(3, -1, 90, 0.9, -1)
@@ -59,12 +61,15 @@ def test_methods_for_whole_frames_and_refused_frames_answer_for_every_door() -> 
 def test_a_file_with_two_doors_is_read_once() -> None:
     reads = []
 
-    def read() -> Points:
+    def read() -> PosedCloud:
         reads.append(1)
-        return np.ones((200, 3), np.float32)
+        return PosedCloud(
+            np.ones((200, 3), np.float32), replace(camera_pose("ros", tilt_from="given"), camera_height_m=0.7)
+        )
 
-    def predictor(cloud: Points) -> Prediction:
+    def predictor(cloud: Points, **known: object) -> Prediction:
         assert len(cloud) == 200
+        assert known == {"door_known": False, "is_level": True, "camera_height_m": 0.7}
         return predict([door(3, 1, "open"), door(3, -1, "closed")])
 
     frames = [

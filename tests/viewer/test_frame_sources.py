@@ -32,7 +32,7 @@ def test_folder_is_read_as_its_index_tells(frames: list[Frame], tmp_path: Path) 
     # Evaluation reads the frames without the options.
     LabelIndex(folder).replace(FILES[0], (DoorLabel("closed"),), "", columns)
     (frame,) = labelled_frames(folder)
-    np.testing.assert_array_equal(frame.read(), source.read(0).points)
+    np.testing.assert_array_equal(frame.read().points, source.read(0).points)
     assert FolderFrames(folder, ReadOptions(), every=3).names == [FILES[0], FILES[3]]
 
 
@@ -61,7 +61,7 @@ def test_labelled_messages_of_a_bag_become_files(kind: str, tmp_path: Path) -> N
     assert source.keep(1) == {"topic": "/points", "stamp_s": "1700000002.000000", "camera_height_m": "1.1"}
     assert [path.name for path in out.iterdir()] == ["frame-000002.npz"]
     LabelIndex(out).replace(source.names[1], (DoorLabel("open"),), "", source.keep(1))
-    np.testing.assert_array_equal(labelled_frames(out)[0].read(), CLOUDS[2])
+    np.testing.assert_array_equal(labelled_frames(out)[0].read().points, CLOUDS[2])
     source.close()
     level = BagFrames(bag, out, ReadOptions(pitch_deg=10.0))
     assert (level.keep(1)["pitch_deg"], level.keep(1)["roll_deg"]) == ("0", "0")

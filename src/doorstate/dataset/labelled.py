@@ -11,13 +11,13 @@ from pathlib import Path
 
 from doorstate.dataset.class_folders import file_row, label_of_folder, nearest_label
 from doorstate.dataset.frame_index import read_index
-from doorstate.dataset.layouts import find_layout
+from doorstate.dataset.layouts import Layout, find_layout
 from doorstate.doorways.doorway import Doorway
 from doorstate.errors import DatasetError, unknown_name
 from doorstate.io.find import INDEX_FILE, find_clouds
 from doorstate.io.options import DEFAULT_OPTIONS, ReadOptions
-from doorstate.io.readers import read_cloud
-from doorstate.types import Points
+from doorstate.io.readers import read_posed_cloud
+from doorstate.io.sensor_pose import PosedCloud, camera_pose
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class LabelledFrame:
     label: str  # a state, `no_door`, or any other text of the index
     columns: Mapping[str, str]  # further columns as written
     folder: Path
-    read: Callable[[], Points]
+    read: Callable[[], PosedCloud]
     doorway: Doorway | None = None  # place of the door that is labelled
     number: int = 1  # among the lines of the file
 
@@ -59,7 +59,10 @@ def labelled_frames(
     if layout is not None:
         published = find_layout(layout)
         rows = published.rows(folder)
-        return [_frame(folder, row, partial(published.read, folder / row["file"], options)) for row in rows]
+        return [
+            _frame(folder, row, partial(_read_published, published, folder / row["file"], options))
+            for row in rows
+        ]
     if not folder.is_dir():
         raise DatasetError("is not a folder", path=folder)
     if (folder / INDEX_FILE).is_file():
@@ -72,7 +75,7 @@ def labelled_frames(
             path=folder,
             expected="folders such as closed, semi-open, open, no-door",
         )
-    return [_frame(folder, row, partial(read_cloud, folder / row["file"], options)) for row in rows]
+    return [_frame(folder, row, partial(read_posed_cloud, folder / row["file"], options)) for row in rows]
 
 
 def _indexed_frames(folder: Path, options: ReadOptions) -> list[LabelledFrame]:
@@ -80,9 +83,15 @@ def _indexed_frames(folder: Path, options: ReadOptions) -> list[LabelledFrame]:
     frames = []
     for row, row_options, doorway in read_index(folder, options):
         lines[row["file"]] += 1
-        frame = _frame(folder, row, partial(read_cloud, folder / row["file"], row_options))
+        frame = _frame(folder, row, partial(read_posed_cloud, folder / row["file"], row_options))
         frames.append(replace(frame, doorway=doorway, number=lines[row["file"]]))
     return frames
+
+
+def _read_published(layout: Layout, path: Path, options: ReadOptions) -> PosedCloud:
+    return PosedCloud(
+        layout.read(path, options), camera_pose("ros", tilt_from="assumed")
+    )  # published images do not tell their tilt
 
 
 def check_column(frames: Sequence[LabelledFrame], column: str) -> None:
@@ -92,6 +101,6 @@ def check_column(frames: Sequence[LabelledFrame], column: str) -> None:
         raise unknown_name("column", column, names)
 
 
-def _frame(folder: Path, row: Mapping[str, str], read: Callable[[], Points]) -> LabelledFrame:
+def _frame(folder: Path, row: Mapping[str, str], read: Callable[[], PosedCloud]) -> LabelledFrame:
     columns = {name: value for name, value in row.items() if name not in ("sample_id", "file", "state")}
     return LabelledFrame(row["file"], row["state"], columns, folder, read)

@@ -21,6 +21,7 @@ from doorstate.evaluation.labelled_doors import prediction_at
 from doorstate.evaluation.manifest import text_values
 from doorstate.evaluation.results import TEXT_COLUMNS, join_manifest
 from doorstate.inference.abstention import Abstention
+from doorstate.inference.posed import predict_posed
 from doorstate.inference.prediction import Prediction
 from doorstate.inference.predictor import Predictor
 from doorstate.types import ABSTAINED, STATES, UNKNOWN_STATE
@@ -177,7 +178,7 @@ def _predict(predictors: Predictors, frame: LabelledFrame) -> dict[str, Predicti
     predictions = {}
     for name, predictor in predictors.items():
         try:
-            predictions[name] = predictor(cloud)
+            predictions[name] = predict_posed(predictor, *cloud)
         except DoorstateError as error:
             predictions[name] = Prediction.abstain(Abstention.from_error(error))
     return predictions

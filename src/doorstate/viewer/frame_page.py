@@ -106,8 +106,9 @@ def make_cards(
     cards = []
     for done, number in enumerate(numbers, 1):
         frame = results.frames[number]
-        cloud = frame.read()
-        named = NamedCloud(frame.name, cloud, truth=frame.label if frame.label in STATES else "")
+        cloud, pose = frame.read()
+        truth = frame.label if frame.label in STATES else ""
+        named = NamedCloud(frame.name, cloud, truth=truth, pose=pose)
         cards.append(
             FrameCard(
                 file=frame.name,

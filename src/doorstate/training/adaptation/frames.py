@@ -31,6 +31,7 @@ from doorstate.errors import DatasetError, DoorstateError
 from doorstate.inference.doorway_predictor import DoorwayPredictor
 from doorstate.inference.known import DoorHint
 from doorstate.inference.network_predictor import NetworkPredictor
+from doorstate.inference.posed import predict_posed
 from doorstate.simulation.manifest import MANIFEST_FILE
 from doorstate.types import NO_DOOR, Part
 
@@ -133,12 +134,17 @@ def _prepare_piece(piece: _Piece, path: Path) -> None:
 
 
 def _samples(predictor: NetworkPredictor, frame: LabelledFrame, name: str) -> list[Sample]:
-    cloud = frame.read()
+    cloud, pose = frame.read()
     if not isinstance(predictor, DoorwayPredictor):
         return [_sample(predictor.prepare(cloud), predictor.num_points)]
     at = None if frame.label == NO_DOOR else frame.doorway
     place = None if at is None else DoorHint(at.x_m, at.y_m, at.yaw_deg, at.width_m)
-    candidates = predictor.candidates(cloud, door_known=False if place is None else place)
+    candidates = predictor.candidates(
+        cloud,
+        door_known=False if place is None else place,
+        is_level=pose.is_tilt_known,
+        camera_height_m=pose.camera_height_m,
+    )
     if not candidates:
         return [Sample(None, reason=_NO_DOORWAY)]
     if frame.label == NO_DOOR:
@@ -146,7 +152,7 @@ def _samples(predictor: NetworkPredictor, frame: LabelledFrame, name: str) -> li
     elif place is not None:
         chosen = {name: candidates[0]}
     else:
-        doors = predictor(cloud).doors
+        doors = predict_posed(predictor, cloud, pose).doors
         score = doors[0].score if doors else None
         chosen = {name: next((pair for pair in candidates if pair[0].score == score), candidates[0])}
     return [
