@@ -27,7 +27,7 @@ from doorstate.inference.decode import decode
 from doorstate.inference.network_predictor import NetworkPredictor
 from doorstate.inference.predictor import Predictor
 from doorstate.networks import create_network
-from doorstate.networks.card import WeightsCard
+from doorstate.networks.card import CARD_KEY, WeightsCard
 from doorstate.networks.weights import save_weights
 from doorstate.simulation.frames import replay
 from doorstate.simulation.manifest import unflatten
@@ -144,6 +144,17 @@ def test_unusable_files_are_weights_errors(tmp_path: Path, exported: Path) -> No
     graph = helper.make_graph([helper.make_node("Identity", ["x"], ["y"])], "foreign", [value], [same])
     onnx.save(helper.make_model(graph, ir_version=10, opset_imports=[helper.make_opsetid("", 18)]), path)
     assert error_of(path).field == "doorstate"
+
+
+def test_a_card_with_an_unknown_head_is_refused(tmp_path: Path, exported: Path) -> None:
+    path = tmp_path / "door.onnx"
+    model = onnx.load(exported)
+    card = WeightsCard(network="pointnet", num_points=160, heads=("angel",))
+    helper.set_model_props(model, {CARD_KEY: card.model_dump_json()})
+    onnx.save(model, path)
+    with pytest.raises(WeightsError) as caught:
+        OnnxBackend(path)
+    assert (caught.value.path, caught.value.field) == (path, "heads")
 
 
 @pytest.mark.parametrize("reason", REASONS)

@@ -55,11 +55,11 @@ def test_bins() -> None:
 def test_drawn_clutter_covers_all_bins_evenly() -> None:
     drawn = [draw_cluttered(Stream(0, index, "cluttered")) for index in range(32)]
     shares = []
-    for scene, viewpoint, openings, tries, _ in drawn:
-        assert 1 <= len(scene.items) <= 8
-        assert 1 <= tries <= 150
-        door_view = DoorView(scene, openings[0], viewpoint.camera_pose(), CAMERA)
-        shares.append(door_view.occluded_share(clutter_boxes(scene)))
+    for scene in drawn:
+        assert 1 <= len(scene.scene.items) <= 8
+        assert 1 <= scene.clutter_tries <= 150
+        door_view = DoorView(scene.scene, scene.openings[0], scene.viewpoint.camera_pose(), CAMERA)
+        shares.append(door_view.occluded_share(clutter_boxes(scene.scene)))
     counts = [sum(occluded_bin(share) == name for share in shares) for name in BINS]
     assert counts[4] == 0
     assert min(counts[:4]) >= 4

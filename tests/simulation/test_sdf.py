@@ -115,7 +115,8 @@ def test_a_world_reads_back_to_the_same_boxes_and_depth(row: Row) -> None:
     pose, camera = read_camera(world)
     assert pose == row.camera_pose()
     depth = cut_range(render_behind_glass(boxes, pose, camera.intrinsics()), camera).depth_m
-    np.testing.assert_allclose(depth, replay(row).cut.depth_m, atol=1e-6)
+    factor = 1.0 if row.bias is None else row.bias.depth_factor  # Gazebo's camera has no such error
+    np.testing.assert_allclose(depth * factor, replay(row).cut.depth_m, atol=1e-6)
 
 
 def test_an_off_centre_camera_is_refused() -> None:

@@ -2,6 +2,7 @@
 """Export of a manifest row as an SDF world for Gazebo (SDFormat 1.7): the scene's shapes and the depth camera.
 
 The world frame is the door frame. SDFormat has capsules from 1.8 on; here each is a cylinder and two spheres.
+The camera has no errors of its own: those of preset `site` are left out.
 """
 
 from __future__ import annotations

@@ -69,6 +69,7 @@ class OnnxBackend:
             self.num_points: int | None = self.card.num_points
         else:
             self.card, self.num_points = read_card(weights), None
+        _check_heads(self.card, weights or path)
         # Packaged graphs, and files of doorstate 0.1, refuse nothing.
         self._refuses = REASON in {output.name for output in self._session.get_outputs()}
         self._heads = head_names(self.card)
@@ -100,6 +101,15 @@ class OnnxBackend:
 def head_names(card: WeightsCard) -> tuple[str, ...]:
     """Return the outputs of a file for heads: those of whole clouds."""
     return tuple(name for name in card.heads if name != PARTS)
+
+
+def _check_heads(card: WeightsCard, path: Path) -> None:
+    """Raise WeightsError if a card names a head that does not exist."""
+    known = (*HEADS, *POINT_HEADS)
+    for name in card.heads:
+        if name not in known:
+            message = f"has an unknown head {name!r}"
+            raise WeightsError(message, path=path, field="heads", expected=" or ".join(known))
 
 
 def is_in_graph(name: str) -> bool:
