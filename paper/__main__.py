@@ -130,7 +130,7 @@ def graphs(
 def finder(
     folder: Annotated[Path, typer.Option(help="Folder of the simulated walls.")] = Path("data/finder"),
     share: Annotated[float, typer.Option(min=0.001, max=1, help="Share of the scenes.")] = 1.0,
-    steps: Annotated[int, typer.Option(min=1, help="Steps of the training.")] = 12_000,
+    steps: Annotated[int, typer.Option(min=1, help="Steps of the training.")] = 30_000,
     out: Annotated[Path | None, typer.Option(help="ONNX file; that of the package if not given.")] = None,
 ) -> None:
     """Simulate walls, and train the network that finds doorways on them."""

@@ -18,7 +18,7 @@ from doorstate._jobs import Progress, no_progress
 from .network import ColumnNetwork, loss
 from .samples import TARGETS, WallSamples
 
-DEFAULT_STEPS = 12_000
+DEFAULT_STEPS = 30_000
 _WALLS = 32  # of a step
 _RATE, _WEIGHT_DECAY, _WARM_UP, _CLIP = 3e-3, 0.02, 50, 5.0
 _MIRROR, _FLOOR_ERROR, _MAX_FLOOR_ROWS = 0.5, 0.4, 2
