@@ -89,7 +89,7 @@ def test_depth_images_are_read_as_they_were_rendered_by_the_index_beside_them(tm
         frame = replay(row)
         labelled = by_file[f"{row.state}/{row.sample_id}.png"]
         points = read_cloud(labelled.folder / labelled.file, indexed.of(labelled.folder / labelled.file))
-        np.testing.assert_array_equal(points, labelled.read())
+        np.testing.assert_array_equal(points, labelled.read().points)
         assert labelled.label == row.state
         assert np.nanmax(np.abs(points - frame.points)) < 1.5e-3  # of depth that is rounded to 1 mm
 
