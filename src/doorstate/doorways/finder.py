@@ -38,7 +38,7 @@ class FinderSettings(FrozenModel):
     """
 
     most: int = Field(default=8, ge=1, le=100)
-    min_score: float = Field(default=0.1, ge=0, le=1)
+    min_score: float = Field(default=0.15, ge=0, le=1)
     width_m: tuple[float, float] = (0.6, 2.4)
 
 
