@@ -112,7 +112,9 @@ def adapt(
             adaptation.train(site.dataset, simulated, device)
         with progress_bar("Testing") as progress:
             adapted = adaptation.finish(site.dataset, simulated, out, device)
-            scores = score_before_and_after(start, out, adaptation.held_out, progress)
+            scores = score_before_and_after(
+                start.absolute(), out.absolute(), adaptation.held_out, workers, adaptation.folder, progress
+            )
     write_text(
         out.with_suffix(".md"), adaptation_card(out.name, adaptation, adapted, scores, len(site.left_out))
     )

@@ -6,10 +6,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from doorstate._jobs import Progress, no_progress
+from doorstate._jobs import Progress, WorkersOrEngine, no_progress
 from doorstate.dataset.labelled import LabelledFrame
+from doorstate.evaluation.frame_pieces import PredictorArguments, evaluate_frames_in_pieces
 from doorstate.evaluation.frame_scores import FrameScores
-from doorstate.evaluation.frames import evaluate_frames
 from doorstate.evaluation.table import (
     Column,
     Table,
@@ -18,7 +18,6 @@ from doorstate.evaluation.table import (
     label_column,
     number_column,
 )
-from doorstate.inference.predictor import Predictor
 from doorstate.training.adaptation.adapt import Adaptation, AdaptedWeights
 
 BEFORE, AFTER = "before", "after"
@@ -26,7 +25,12 @@ _DOOR = "door"
 
 
 def score_before_and_after(
-    before: Path, after: Path, held_out: Sequence[LabelledFrame], progress: Progress = no_progress
+    before: Path,
+    after: Path,
+    held_out: Sequence[LabelledFrame],
+    workers: WorkersOrEngine = 1,
+    folder: Path | None = None,
+    progress: Progress = no_progress,
 ) -> FrameScores | None:
     """Score two weights files on the same frames; None without a frame that can be read.
 
@@ -34,10 +38,12 @@ def score_before_and_after(
         before: weights file that the adaptation began with.
         after: adapted weights file.
         held_out: frames that were not trained on.
-        progress: called with frames done and frames in all.
+        workers: number of processes on this machine, None for one a processor, or an engine.
+        folder: folder for temporary files, as for `map_pieces`.
+        progress: called with pieces done and pieces in all.
     """
-    predictors = {name: Predictor.load(path) for name, path in ((BEFORE, before), (AFTER, after))}
-    results = evaluate_frames(predictors, held_out, progress)
+    methods = PredictorArguments({BEFORE: {"name_or_path": before}, AFTER: {"name_or_path": after}})
+    results = evaluate_frames_in_pieces(methods, held_out, workers, folder, progress)
     if not results.frames:
         return None
     return results.score(_DOOR if all(frame.columns.get(_DOOR) for frame in results.frames) else None)

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from doorstate._jobs import Engine, Progress, Resources, map_pieces, no_progress
+from doorstate._jobs import Progress, Resources, WorkersOrEngine, map_pieces, no_progress
 from doorstate.dataset.labelled import LabelledFrame
 from doorstate.evaluation.frames import FrameResults, Predictors, evaluate_frames
 from doorstate.inference.backends import needs_torch
@@ -38,7 +38,7 @@ class PredictorArguments(NamedTuple):
 def evaluate_frames_in_pieces(
     methods: PredictorArguments,
     frames: Sequence[LabelledFrame],
-    engine: Engine,
+    workers: WorkersOrEngine,
     folder: Path | None = None,
     progress: Progress = no_progress,
     resources: Resources | None = None,
@@ -48,14 +48,14 @@ def evaluate_frames_in_pieces(
     Args:
         methods: networks and rules.
         frames: labelled frames.
-        engine: runs the pieces.
+        workers: number of processes on this machine, None for one a processor, or an engine.
         folder: folder for temporary files, as for `map_pieces`.
         progress: called with pieces done and pieces in all.
         resources: needs of each piece.
     """
     starts = range(0, len(frames), _FRAMES_PER_PIECE)
     pieces = [frames[start : start + _FRAMES_PER_PIECE] for start in starts]
-    parts = map_pieces(evaluate_frames, methods.load, pieces, engine, folder, progress, resources)
+    parts = map_pieces(evaluate_frames, methods.load, pieces, workers, folder, progress, resources)
     return FrameResults(
         tuple(frame for part in parts for frame in part.frames),
         {name: tuple(found for part in parts for found in part.outputs[name]) for name in methods.by_name},
