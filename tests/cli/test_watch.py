@@ -9,7 +9,7 @@ import json
 import signal
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import closing, suppress
 from dataclasses import replace
 from functools import partial
@@ -23,20 +23,26 @@ from rich.console import Console
 from doorstate.cameras import registry
 from doorstate.cameras.clock import DayTime, steady_s
 from doorstate.cameras.grabber import Counts
-from doorstate.cameras.watcher import CameraWatch, Notice
-from doorstate.cli import watch_output
+from doorstate.cameras.watcher import CameraReport, CameraWatch, Notice
+from doorstate.cli import predictors, watch_output
 from doorstate.cli.depth_picture import depth_picture, depth_pixels, draw_line
+from doorstate.cli.named_options import CameraPoses, NamedDoors
 from doorstate.cli.watch import _publish
+from doorstate.doors.door_file import write_doors
+from doorstate.doors.named_door import DoorList
+from doorstate.doors.tracker import DoorTracker
 from doorstate.inference.door import Door
 from doorstate.inference.door_lines import Line
+from doorstate.inference.known import Known
 from doorstate.inference.prediction import Prediction
 from doorstate.inference.watch_settings import WatchSettings
 from doorstate.simulation.camera import DepthCamera
 from doorstate.simulation.frames import Frame
-from doorstate.types import DoorState
+from doorstate.types import DoorState, Points
 from tests.cameras.scripted import ABSENT, GONE, FixedPredictor, ScriptedCamera, frame
 from tests.cli.helpers import Run, check_error
 from tests.cli.test_view import free_port
+from tests.doors.examples import AT_ORIGIN, named
 
 SMALL = ("--camera", "simulated", "--size", "64x48", "--fps", 20)
 
@@ -179,6 +185,8 @@ def test_attached_cameras_are_listed(run: Run) -> None:
     ("arguments", "expected_code", "name"),
     [
         ((), 2, "--camera"),
+        (("--camera", "simulated", "--doors", "doors.yaml"), 2, "--camera-pose"),
+        (("--camera", "simulated", "--poses", "poses.csv"), 2, "--doors"),
         (("--camera", "realsens"), 2, "realsense"),
         (("--camera", "simulated", "--port", 8000), 2, "--port"),
         (("--camera", "simulated", "--view", "--json"), 2, "--json"),
@@ -226,8 +234,10 @@ class Publisher:
 
     def __init__(self) -> None:
         self.told: list[tuple[Any, float]] = []
+        self.doors: list[str] = []
 
     def update(self, statuses: list[Any], age_s: float) -> None:
+        self.doors += [status.door for status in statuses]
         self.told += [(status.state, age_s) for status in statuses]
 
 
@@ -240,6 +250,87 @@ def test_a_camera_that_is_gone_is_published_once_as_unknown() -> None:
     assert [state for state, _ in publisher.told[-2:]] == [DoorState.OPEN, None]
     assert len(publisher.told) == 26
     assert publisher.told[0][1] == reports[0].latency_s > 2, "the age of the image"
+
+
+LISTED = DoorList(doors=(named("front", 2.0, 0.0), named("lab", -3.0, 0.0)))
+
+
+class SeesDoor(FixedPredictor):
+    """Predictor that sees an open door straight ahead, and another that no list has."""
+
+    def _predict(self, clouds: Sequence[Points], known: Known) -> list[Prediction]:
+        sure = {"closed": 0.01, "semi_open": 0.01, "open": 0.98}
+        doors = [
+            Door(2.0, y_m, 90.0, 0.9, DoorState.OPEN, raw_probabilities=sure, leaf_seen=True)
+            for y_m in (0.0, 1.5)
+        ]
+        return [Prediction.from_doors(doors, [], 100, 1.0) for _ in clouds]
+
+
+@pytest.fixture
+def listed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[object, ...]:
+    """Options of a list of two doors and of a camera that stands still, whose predictor sees one of them."""
+    write_doors(tmp_path / "doors.yaml", LISTED)
+    monkeypatch.setattr(predictors, "load_predictor", lambda *_, **__: SeesDoor(DoorState.OPEN))
+    return "--camera", "simulated", "--doors", tmp_path / "doors.yaml", "--camera-pose", "0 0 0"
+
+
+def test_doors_of_a_list_have_names_and_a_camera_that_is_gone_sees_none(
+    run: Run, scripted: Callable[..., ScriptedCamera], listed: tuple[object, ...], tmp_path: Path
+) -> None:
+    scripted(*range(20), GONE, *[ABSENT] * 1000)
+    history = tmp_path / "doors.sqlite"
+    code, out, err = run("watch", *listed, "--json", "--seconds", 3, "--history", history)
+    assert code == 0, err
+    rows = [json.loads(line) for line in out.splitlines()]
+    seen = [row for row in rows if row["state"]]
+    assert [door["name"] for door in seen[-1]["doors"]] == ["front", "unknown door"]
+    front, lab = seen[-1]["named_doors"]
+    assert (front["id"], front["seen"], front["filtered_state"]) == ("front", True, "open")
+    assert (lab["seen"], lab["state"]) == (False, None)
+    gone = [row for row in rows if not row.get("doors")]
+    assert gone
+    assert all(door["state"] is None and not door["seen"] for row in gone for door in row["named_doors"])
+    assert "unplugged" in gone[-1]["named_doors"][0]["reason"]
+    code, out, _ = run("doors", "history", history, "--json")
+    events = [json.loads(line) for line in out.splitlines()]
+    assert code == 0
+    assert [(event["door"], event["to"]) for event in events] == [("front", "open"), ("front", "not_seen")]
+
+
+def test_without_a_new_pose_no_door_has_a_name(
+    run: Run, scripted: Callable[..., ScriptedCamera], listed: tuple[object, ...], tmp_path: Path
+) -> None:
+    scripted(*range(5), *["nothing"] * 1000)
+    poses = tmp_path / "poses.csv"
+    poses.write_text("time,x,y,yaw\n1.0,0,0,0\n", encoding="utf-8")
+    code, out, err = run("watch", *listed[:4], "--poses", poses, "--json", "--seconds", 1)
+    assert code == 0, err
+    rows = [json.loads(line) for line in out.splitlines()]
+    assert all(not door["seen"] for row in rows for door in row["named_doors"])
+    assert " s old" in rows[0]["named_doors"][0]["reason"]
+    assert {door["name"] for row in rows for door in row.get("doors", ())} == {"unknown door"}
+
+
+def named_report() -> CameraReport:
+    watch = CameraWatch(WatchSettings(), SeesDoor(DoorState.OPEN), day_time=DayTime())
+    doors = NamedDoors(
+        DoorTracker(LISTED.doors), CameraPoses(place=AT_ORIGIN), False, lambda: DoorTracker(())
+    )
+    report = watch.answer(frame(1), Counts(grabbed=1))
+    return replace(report, named=doors.follow(SeesDoor(DoorState.OPEN), report))
+
+
+def test_names_are_printed_and_published(capsys: pytest.CaptureFixture[str]) -> None:
+    report, publisher = named_report(), Publisher()
+    watch_output.LinePrinter()(report)
+    printed = capsys.readouterr().out
+    assert "front: open" in printed
+    assert "unknown door: open" in printed
+    assert "lab: not seen" in printed
+    list(_publish([report], publisher))  # type: ignore[arg-type]
+    assert publisher.doors == ["front", "lab"]
+    assert [line.plain.split()[0] for line in watch_output._doors(report, 24)] == ["front", "unknown"]
 
 
 def test_near_is_bright_far_is_dark_and_nothing_is_black() -> None:

@@ -190,3 +190,16 @@ def test_a_door_is_seen_while_the_robot_drives_past_it() -> None:
         local = camera.pose.inverse().after(side.place)
         prediction = Prediction.from_doors([seen(*local)], [], 1, 1.0)
         assert tracker.update(prediction, camera, x_m).sightings[0].state == DoorState.CLOSED
+
+
+def test_without_a_cloud_no_door_is_seen_and_old_ones_are_lost_in_time() -> None:
+    tracker = DoorTracker(DOORS, lost_s=2.0)
+    for tenth in range(12):
+        show(tracker, tenth / 10, [seen(3.0, 0.6, state="open")])
+    missed = tracker.miss("no camera", 1.3)
+    assert [sighting.code for sighting in missed.sightings] == ["refused"] * 3
+    assert all("no camera" in sighting.reason() for sighting in missed.sightings)
+    assert all(sighting.state is sighting.filtered is None for sighting in missed.sightings)
+    assert (missed.names, missed.events) == ((), ())
+    assert missed.sightings[0].last_state == "open"
+    assert [event.to_state for event in tracker.miss("no camera", 3.2).events] == ["not_seen"]

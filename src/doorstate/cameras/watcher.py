@@ -18,6 +18,7 @@ from doorstate.cameras.clock import DayTime, steady_s
 from doorstate.cameras.device import DepthFrame
 from doorstate.cameras.grabber import Counts, Ended, FrameGrabber, Gone, Opened
 from doorstate.cameras.gravity import tilt_of
+from doorstate.doors.tracker import TrackedFrame
 from doorstate.errors import CameraError
 from doorstate.inference.abstention import Abstention
 from doorstate.inference.door_report import DoorReport
@@ -54,6 +55,7 @@ class CameraReport:
         latency_s: from the image to the answer.
         counts: frames so far.
         notices: what happened since the last report.
+        named: doors of a list; None without one.
     """
 
     door: DoorReport
@@ -62,6 +64,7 @@ class CameraReport:
     latency_s: float
     counts: Counts
     notices: tuple[Notice, ...] = ()
+    named: TrackedFrame | None = None
 
 
 class CameraWatch:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -15,20 +15,33 @@ from doorstate.cli.shared_options import with_shared_options
 from doorstate.errors import ConfigError, DoorFileError
 
 if TYPE_CHECKING:
+    from doorstate.cameras.watcher import CameraReport
     from doorstate.doors.camera_place import CameraPlace, MissingPlace
     from doorstate.doors.history import DoorHistory
     from doorstate.doors.named_predictor import NamedPrediction
     from doorstate.doors.pose_file import PoseFile
-    from doorstate.doors.tracker import DoorTracker
+    from doorstate.doors.pose_stream import PoseStream
+    from doorstate.doors.tracker import DoorTracker, TrackedFrame
     from doorstate.inference.predictor import Predictor
     from doorstate.io.sensor_pose import PosedCloud
 
-PosesOption = Annotated[
+DoorsOption = Annotated[
     Path | None,
     typer.Option(
         metavar="FILE",
-        help="Poses of the camera in the map: a table with time or file, x, y, yaw (or x, y, z, qx, qy, qz, qw), or"
-        " lines of a TUM trajectory.",
+        help="List of doors with names (doors.yaml): tell their states by name; needs poses.",
+    ),
+]
+_POSES = (
+    "Poses of the camera in the map: a table with time or file, x, y, yaw (or x, y, z, qx, qy, qz, qw), or"
+    " lines of a TUM trajectory."
+)
+PosesOption = Annotated[Path | None, typer.Option(metavar="FILE", help=_POSES)]
+PoseStreamOption = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE",
+        help=_POSES + " They are read as they come, from a pipe or a file that grows; - is standard input.",
     ),
 ]
 CameraPose = Annotated[
@@ -53,14 +66,27 @@ PoseAxes = Annotated[
     ),
 ]
 MapFrame = Annotated[str, typer.Option(help="Frame of poses that name none, as in the list of doors.")]
+HistoryOption = Annotated[
+    Path | None, typer.Option(metavar="FILE", help="Add changes of these doors to this SQLite file.")
+]
+HistoryDays = Annotated[
+    float, typer.Option(help="Days of changes that the history keeps, back from its newest.", min=0.01)
+]
+AskDoors = Annotated[
+    bool,
+    typer.Option(
+        "--ask-doors", help="Ask for doors of the list that are in view and were not found: slower."
+    ),
+]
 
 
 @dataclass(frozen=True)
 class CameraPoses:
     """Poses of the camera that a user gave."""
 
-    file: PoseFile | None
-    place: CameraPlace | None  # of a camera that stands still
+    file: PoseFile | None = None
+    place: CameraPlace | None = None  # of a camera that stands still
+    stream: PoseStream | None = None  # of a camera that is watched
 
     def of_file(self, path: Path) -> tuple[float | None, CameraPlace | MissingPlace]:
         """Return time, if it is known, and pose of the camera of a file."""
@@ -73,8 +99,9 @@ class CameraPoses:
         """Return the pose of the camera at a time."""
         if self.place is not None:
             return self.place
-        assert self.file is not None
-        return self.file.at(stamp_s)
+        known = self.file or self.stream
+        assert known is not None
+        return known.at(stamp_s)
 
 
 def parse_pose_error(text: str | None) -> tuple[float, float]:
@@ -97,15 +124,22 @@ def parse_pose_error(text: str | None) -> tuple[float, float]:
 
 
 def read_camera_poses(
-    poses: Path | None, camera_pose: str | None, pose_error: str | None, pose_axes: str, map_frame: str
+    poses: Path | None,
+    camera_pose: str | None,
+    pose_error: str | None,
+    pose_axes: str,
+    map_frame: str,
+    *,
+    live: bool = False,
 ) -> CameraPoses | None:
-    """Return the poses of the camera; None if none are given.
+    """Return the poses of the camera; None if none are given. Live ones are read once the stream is entered.
 
     Raises:
         ConfigError: an option has no such value, or options exclude each other.
         DoorFileError: the file cannot be used.
     """
     from doorstate.doors.pose_file import DEFAULTS, parse_place, read_poses
+    from doorstate.doors.pose_stream import PoseStream
 
     if poses is not None and camera_pose is not None:
         raise ConfigError("give either --poses or --camera-pose")
@@ -116,9 +150,11 @@ def read_camera_poses(
     defaults = defaults._replace(position_error_m=error_m, yaw_error_deg=error_deg)
     try:
         if camera_pose is not None:
-            return CameraPoses(None, parse_place(camera_pose, defaults))
+            return CameraPoses(place=parse_place(camera_pose, defaults))
         assert poses is not None
-        return CameraPoses(read_poses(poses, defaults), None)
+        if live:
+            return CameraPoses(stream=PoseStream(poses, defaults))
+        return CameraPoses(read_poses(poses, defaults))
     except DoorFileError as error:
         if error.path is not None:
             raise
@@ -158,9 +194,37 @@ class NamedDoors:
         found = predict_named(
             predictor, cloud.points, cloud.pose, tracker, place, stamp_s or 0.0, frame=frame, asks=self.asks
         )
-        if self.history is not None:
-            self.history.record(found.tracked.events, tracker.last_seen, stamp_s)
+        self._record(found.tracked, tracker, stamp_s or 0.0)
         return found
+
+    def follow(self, predictor: Predictor, report: CameraReport) -> TrackedFrame:
+        """Name the doors of a live camera's report, and add what changed to the history.
+
+        Raises:
+            DoorFileError: the history cannot be written any more.
+        """
+        from doorstate.doors.named_predictor import name_doors
+
+        prediction, stamp_s = report.door.prediction, report.door.stamp_ns / 1e9
+        if report.points is None:
+            tracked = self.tracker.miss(prediction.reason, stamp_s)
+        else:
+            tracked = name_doors(
+                prediction,
+                predictor,
+                report.points,
+                report.door.pose,
+                self.tracker,
+                self.poses.at(stamp_s),
+                stamp_s,
+                asks=self.asks,
+            )
+        self._record(tracked, self.tracker, stamp_s)
+        return tracked
+
+    def _record(self, tracked: TrackedFrame, tracker: DoorTracker, stamp_s: float) -> None:
+        if self.history is not None:
+            self.history.record(tracked.events, tracker.last_seen, stamp_s)
 
 
 @dataclass(frozen=True)
@@ -186,42 +250,28 @@ class NamedOptions:
         list_ = read_doors(self.doors).doors
         assert self.poses is not None
         named = NamedDoors(DoorTracker(list_), self.poses, self.asks, lambda: DoorTracker(list_))
-        if self.history is None:
-            yield named
-            return
-        with DoorHistory(self.history, self.history_days) as history:
-            named.history = history
+        with ExitStack() as stack:
+            if self.poses.stream is not None:
+                stack.enter_context(self.poses.stream)
+            if self.history is not None:
+                named.history = stack.enter_context(DoorHistory(self.history, self.history_days))
             try:
                 yield named
             finally:
-                history.record(named.tracker.end(), {})
+                if named.history is not None:
+                    named.history.record(named.tracker.end(), {})
 
 
 def read_named_options(
-    doors: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="List of doors with names (doors.yaml): tell their states by name; needs poses.",
-        ),
-    ] = None,
+    doors: DoorsOption = None,
     poses: PosesOption = None,
     camera_pose: CameraPose = None,
     pose_error: PoseError = None,
     pose_axes: PoseAxes = "ros",
     map_frame: MapFrame = "map",
-    history: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Add changes of these doors to this SQLite file.")
-    ] = None,
-    history_days: Annotated[
-        float, typer.Option(help="Days of changes that the history keeps, back from its newest.", min=0.01)
-    ] = 365.0,
-    ask_doors: Annotated[
-        bool,
-        typer.Option(
-            "--ask-doors", help="Ask for doors of the list that are in view and were not found: slower."
-        ),
-    ] = False,
+    history: HistoryOption = None,
+    history_days: HistoryDays = 365.0,
+    ask_doors: AskDoors = False,
 ) -> NamedOptions:
     """Return the options of doors with names that a user typed.
 
@@ -230,11 +280,34 @@ def read_named_options(
         DoorFileError: poses cannot be read.
     """
     known = read_camera_poses(poses, camera_pose, pose_error, pose_axes, map_frame)
-    if doors is None and (known is not None or history is not None or ask_doors):
+    return _named_options(doors, known, history, history_days, ask_doors)
+
+
+def read_live_named_options(
+    doors: DoorsOption = None,
+    poses: PoseStreamOption = None,
+    camera_pose: CameraPose = None,
+    pose_error: PoseError = None,
+    pose_axes: PoseAxes = "ros",
+    map_frame: MapFrame = "map",
+    history: HistoryOption = None,
+    history_days: HistoryDays = 365.0,
+    ask_doors: AskDoors = False,
+) -> NamedOptions:
+    """Return the same for a live camera, whose poses come while it is watched; errors are the same."""
+    known = read_camera_poses(poses, camera_pose, pose_error, pose_axes, map_frame, live=True)
+    return _named_options(doors, known, history, history_days, ask_doors)
+
+
+def _named_options(
+    doors: Path | None, poses: CameraPoses | None, history: Path | None, history_days: float, asks: bool
+) -> NamedOptions:
+    if doors is None and (poses is not None or history is not None or asks):
         raise ConfigError("--poses, --camera-pose, --history and --ask-doors need --doors")
-    if doors is not None and known is None:
+    if doors is not None and poses is None:
         raise ConfigError("--doors needs --poses or --camera-pose")
-    return NamedOptions(doors, known, history, history_days, ask_doors)
+    return NamedOptions(doors, poses, history, history_days, asks)
 
 
 with_named_options = with_shared_options(read_named_options, "named")
+with_live_named_options = with_shared_options(read_live_named_options, "named")

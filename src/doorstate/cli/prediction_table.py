@@ -147,7 +147,7 @@ class PredictionTable:
             if not is_named:
                 short = f"{indent}{number}"
             self._print_answer(long if len(long) <= self._name_width else short, door)
-        for line in _not_seen(row.get("named_doors", ())):
+        for line in not_seen_lines(row.get("named_doors", ())):
             self._print_reason(printable(line))
         if self._draws and doors:
             for drawn in door_drawing(doors):
@@ -185,7 +185,7 @@ class PredictionTable:
             console.stdout.print(line, style="dim")
 
 
-def _not_seen(sightings: Sequence[dict[str, Any]]) -> list[str]:
+def not_seen_lines(sightings: Sequence[dict[str, Any]]) -> list[str]:
     """Return lines for the doors of a list that this cloud does not show: one for those with the same reason."""
     names: dict[str, list[str]] = {}
     for sighting in sightings:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import re
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,6 +13,7 @@ import typer
 
 from doorstate.cli.choices import CAMERA
 from doorstate.cli.mqtt_options import MqttOptions, with_mqtt_options
+from doorstate.cli.named_options import NamedOptions, with_live_named_options
 from doorstate.cli.options import (
     AsJson,
     BudgetMs,
@@ -34,13 +36,16 @@ if TYPE_CHECKING:
     from doorstate.cameras.device import DepthFrame
     from doorstate.cameras.grabber import FrameGrabber
     from doorstate.cameras.watcher import CameraReport
+    from doorstate.cli.named_options import NamedDoors
     from doorstate.cli.watch_output import Show
+    from doorstate.inference.predictor import Predictor
     from doorstate.mqtt.publisher import MqttPublisher
 
 _SIZE = re.compile(r"(\d{1,5})x(\d{1,5})")
 
 
 @with_mqtt_options
+@with_live_named_options
 def watch(
     camera: Annotated[
         str | None,
@@ -96,11 +101,13 @@ def watch(
         typer.Option(help="Stop after this time. [default: at Ctrl-C]", min=0.1, show_default=False),
     ] = None,
     *,
+    named: NamedOptions,
     mqtt: MqttOptions,
 ) -> None:
     """Watch over a door with a depth camera that is attached to this machine.
 
     The newest image is answered, and older ones are dropped. A camera that is unplugged is looked for until it is back.
+    With a list of doors and the poses of the camera, each door has its name; one out of view is not seen.
 
     \b
     Examples:
@@ -111,6 +118,8 @@ def watch(
       doorstate watch --camera orbbec --serial CP12345 --json
       doorstate watch --camera simulated --serial loose-cable --view --no-open
       doorstate watch --camera realsense --mqtt mqtts://robot@broker.local --mqtt-camera hall
+      doorstate watch --camera oak --doors doors.yaml --camera-pose '2.5 0.4 90' --history doors.sqlite
+      localisation | doorstate watch --camera realsense --doors doors.yaml --poses - --json
     """
     from doorstate.cameras.clock import DayTime
     from doorstate.cameras.device import CameraRequest
@@ -133,6 +142,11 @@ def watch(
         raise ConfigError("--port needs --view")
     if view and as_json:
         raise ConfigError("--json cannot be combined with --view")
+    methods = Methods(network, weights, rule)
+    if named.doors is not None and (door_known or door_pose or door_box):
+        raise ConfigError(
+            "--doors asks for its own doors: leave --door-known, --door-pose and --door-box out"
+        )
     settings = parse_settings(
         {
             "door_known": door_known,
@@ -156,27 +170,37 @@ def watch(
                 recorder.write(frame, day_time.stamp_ns(frame.captured_s))
 
         grabber = stack.enter_context(FrameGrabber(device, request, on_frame=keep))
-        predictor = load_predictor(
-            Methods(network, weights, rule), points, budget_ms=budget_ms, threads=threads
-        )
+        doors = stack.enter_context(named.open())
+        predictor = load_predictor(methods, points, budget_ms=budget_ms, threads=threads)
         watched = CameraWatch(settings, predictor, accelerometer=accelerometer, day_time=day_time)
         publisher = stack.enter_context(mqtt.open())
         with show_reports(
             predictor, as_json=as_json, view=view, port=port, open_browser=open_browser
         ) as show:
-            answered = _follow(_publish(watched.follow(grabber), publisher), show, seconds)
+            reports = _name(watched.follow(grabber), predictor, doors)
+            answered = _follow(_publish(reports, publisher), show, seconds)
     _print_end(grabber, answered, None if recorder is None else recorder.frames, record)
+
+
+def _name(
+    reports: Iterable[CameraReport], predictor: Predictor, doors: NamedDoors | None
+) -> Iterator[CameraReport]:
+    """Yield the reports, with the doors of a list where there is one."""
+    for report in reports:
+        yield report if doors is None else replace(report, named=doors.follow(predictor, report))
 
 
 def _publish(reports: Iterable[CameraReport], publisher: MqttPublisher | None) -> Iterator[CameraReport]:
     """Yield the reports, and publish those of frames; a camera that is gone is unknown at once, and then offline."""
-    from doorstate.mqtt.status import status_of_front_door
+    from doorstate.mqtt.status import status_of_front_door, status_of_sighting
 
     for report in reports:
         is_news = report.frame is not None or any(notice.code == "camera_gone" for notice in report.notices)
         if publisher is not None and is_news:
-            status = status_of_front_door(report.door.prediction, report.door.filtered)
-            publisher.update([status], report.latency_s)
+            statuses = [status_of_front_door(report.door.prediction, report.door.filtered)]
+            if report.named is not None:
+                statuses = [status_of_sighting(sighting) for sighting in report.named.sightings]
+            publisher.update(statuses, report.latency_s)
         yield report
 
 

@@ -15,7 +15,7 @@ from rich.text import Text
 
 from doorstate.cli import console
 from doorstate.cli.flags import format_flag
-from doorstate.cli.prediction_table import STATE_STYLES, door_drawing, side_of
+from doorstate.cli.prediction_table import STATE_STYLES, door_drawing, not_seen_lines, side_of
 from doorstate.types import DoorState
 
 if TYPE_CHECKING:
@@ -84,15 +84,16 @@ class LinePrinter:
             console.stdout.print(f"{_clock_time(report)}  {_notice_text(notice)}")
         prediction = report.door.prediction
         code = prediction.abstention and prediction.abstention.code
-        told = (report.door.state, prediction.state, code, len(prediction.doors))
+        told = (report.door.state, prediction.state, code, len(prediction.doors), _labels(report))
         if told == self._last:
             return
         self._last = told
-        doors = "; ".join(_door_text(door) for door in prediction.doors)
+        texts = zip(_names(report), prediction.doors, strict=True)
+        doors = [f"{name}: {_door_text(door)}" if name else _door_text(door) for name, door in texts]
         parts = [
             _clock_time(report),
             f"{_over_time(report):<22}",
-            doors or prediction.reason,
+            "; ".join([*(doors or filter(None, [prediction.reason])), *_not_seen(report)]),
             _latency(report),
         ]
         console.stdout.print("  ".join(filter(None, parts)))
@@ -111,6 +112,7 @@ def describe(report: CameraReport) -> Group:
         parts.append(depth_picture(report.frame, door, min(width, _PICTURE_COLUMNS), rows))
     parts.append(Text(_over_time(report), STATE_STYLES.get(door.state, "bold")))
     parts += doors
+    parts += [Text(f"  {line}", "dim") for line in _not_seen(report)]
     if reason := door.prediction.reason:
         parts.append(Text(f"  {reason}", "dim"))
     counts = report.counts
@@ -123,13 +125,38 @@ def _doors(report: CameraReport, height: int) -> list[Text]:
     """Return the doors from above where there is room, else a line for each."""
     from doorstate.inference.serialization import door_to_dict
 
-    doors = report.door.prediction.doors
-    if doors and height >= _ROWS_OF_DRAWING and (drawing := door_drawing([*map(door_to_dict, doors)])):
-        return drawing
+    doors, names = report.door.prediction.doors, _names(report)
+    if doors and height >= _ROWS_OF_DRAWING:
+        records = [
+            door_to_dict(door) | ({"name": name} if name else {})
+            for name, door in zip(names, doors, strict=True)
+        ]
+        if drawing := door_drawing(records):
+            return drawing
     return [
-        Text(f"  {number}  {_door_text(one)}", STATE_STYLES.get(str(one.state), ""))
-        for number, one in enumerate(doors, 1)
+        Text(f"  {name or number}  {_door_text(one)}", STATE_STYLES.get(str(one.state), ""))
+        for number, (name, one) in enumerate(zip(names, doors, strict=True), 1)
     ]
+
+
+def _names(report: CameraReport) -> list[str]:
+    """Return the name of each door of the prediction; empty texts without a list of doors."""
+    from doorstate.doors.sighting import UNKNOWN_DOOR
+
+    if report.named is None:
+        return [""] * len(report.door.prediction.doors)
+    return [name or UNKNOWN_DOOR for name in report.named.names]
+
+
+def _labels(report: CameraReport) -> list[str]:
+    return [] if report.named is None else [sighting.label for sighting in report.named.sightings]
+
+
+def _not_seen(report: CameraReport) -> list[str]:
+    """Return lines for the doors of a list that the image does not show."""
+    if report.named is None:
+        return []
+    return not_seen_lines([sighting.to_dict(format_flag) for sighting in report.named.sightings])
 
 
 def _limited(show: Show) -> Show:
@@ -147,6 +174,7 @@ def _limited(show: Show) -> Show:
 
 
 def _print_json(report: CameraReport) -> None:
+    from doorstate.doors.sighting import names_of_doors
     from doorstate.inference.serialization import prediction_to_dict
 
     door = report.door
@@ -163,7 +191,11 @@ def _print_json(report: CameraReport) -> None:
         "dropped": report.counts.dropped,
         "notices": [{"code": notice.code, "text": notice.text} for notice in report.notices],
     }
-    console.print_json(record | prediction_to_dict(door.prediction, format_flag, door.pose))
+    values = prediction_to_dict(door.prediction, format_flag, door.pose)
+    if report.named is not None:
+        values = names_of_doors(values, report.named.names)
+        values["named_doors"] = [sighting.to_dict(format_flag) for sighting in report.named.sightings]
+    console.print_json(record | values)
 
 
 @contextmanager
@@ -186,7 +218,9 @@ def _page(predictor: Predictor, port: int, open_browser: bool) -> Iterator[Show]
             named = NamedCloud(_clock_time(report), cloud, pose=report.door.pose)
             facts = [("over time", _over_time(report)), ("latency", _latency(report, ""))]
             facts += [("notice", _notice_text(notice)) for notice in report.notices]
-            page.publish("cloud", make_live_entry(prediction, named, facts, format_flag))
+            facts += [("doors", line) for line in _not_seen(report)]
+            names = () if report.named is None else report.named.names
+            page.publish("cloud", make_live_entry(prediction, named, facts, format_flag, names))
 
         yield _limited(show)
         page.publish("end", None)

@@ -53,6 +53,25 @@ def predict_named(
         CloudContentError, ConfigError: as in `Predictor.__call__`.
     """
     prediction = predict_posed(predictor, points, pose)
+    tracked = name_doors(
+        prediction, predictor, points, pose, tracker, camera, stamp_s, frame=frame, asks=asks
+    )
+    return NamedPrediction(prediction, tracked)
+
+
+def name_doors(
+    prediction: Prediction,
+    predictor: Predictor,
+    points: Points,
+    pose: SensorPose | None,
+    tracker: DoorTracker,
+    camera: CameraPlace | MissingPlace,
+    stamp_s: float,
+    *,
+    frame: str = "",
+    asks: bool = False,
+) -> TrackedFrame:
+    """Match the doors of a prediction that was made elsewhere; arguments and errors are those of `predict_named`."""
 
     def ask(hint: DoorHint) -> Door | None:
         answer = predict_posed(predictor, points, pose, hint)
@@ -64,5 +83,4 @@ def predict_named(
         return door if is_door else None
 
     view = View.of(points, prediction.tilt)
-    tracked = tracker.update(prediction, camera, stamp_s, view, frame=frame, ask=ask if asks else None)
-    return NamedPrediction(prediction, tracked)
+    return tracker.update(prediction, camera, stamp_s, view, frame=frame, ask=ask if asks else None)

@@ -98,29 +98,21 @@ def read_poses(path: Path, defaults: PoseDefaults = DEFAULTS) -> PoseFile:
         DoorFileError: no such format, with the line and the column of the first problem.
     """
     text = read_input_text(path, MAX_POSES_BYTES, DoorFileError)
-    rows = _rows(text, path)
-    try:
-        axes = parse_axes(defaults.axes)
-    except CameraError as error:
-        raise DoorFileError(error.message, field=error.field, expected=error.expected) from error
+    reader = PoseReader(path, defaults)
     stamped: list[tuple[float, CameraPlace]] = []
     by_file: dict[str, tuple[float | None, CameraPlace]] = {}
-    for line, row in rows:
-        numbers = {
-            name: _number(value, name, line, path)
-            for name, value in row.items()
-            if name in _NUMBERS and value
-        }
-        place = _place(row, numbers, defaults._replace(axes=axes), line, path)
-        stamp_s = numbers.get("time")
-        if file := row.get("file"):
-            if file in by_file:
-                raise _error(path, line, f"{file!r} has a pose already", "file")
-            by_file[file] = stamp_s, place
-        elif stamp_s is None:
-            raise _error(path, line, "has neither a time nor a file", "time")
-        if stamp_s is not None:
-            stamped.append((stamp_s, place))
+    for number, line in enumerate(text.splitlines(), 1):
+        pose = reader.read(line, number)
+        if pose is None:
+            continue
+        if pose.file:
+            if pose.file in by_file:
+                raise _error(path, number, f"{pose.file!r} has a pose already", "file")
+            by_file[pose.file] = pose.stamp_s, pose.place
+        if pose.stamp_s is not None:
+            stamped.append((pose.stamp_s, pose.place))
+    if not reader.has_lines:
+        raise DoorFileError("has no poses", path=path)
     stamped.sort(key=lambda pair: pair[0])
     for (first_s, first), (second_s, second) in pairwise(stamped):
         if first_s == second_s and first != second:
@@ -146,21 +138,72 @@ def parse_place(text: str, defaults: PoseDefaults = DEFAULTS) -> CameraPlace:
     return CameraPlace(pose, defaults.frame, defaults.position_error_m, defaults.yaw_error_deg)
 
 
-def _rows(text: str, path: Path) -> list[tuple[int, dict[str, str]]]:
-    """Return lines with their numbers, as values by the name of their column."""
-    lines = [
-        (number, line.strip())
-        for number, line in enumerate(text.splitlines(), 1)
-        if line.strip() and not line.lstrip().startswith("#")
-    ]
-    if not lines:
-        raise DoorFileError("has no poses", path=path)
-    first, header = lines[0]
-    if not _starts_with_number(header):
-        names = [name.strip() for name in next(csv.reader([header]))]
-        _check_columns(names, first, path)
-        return [(number, _cells(names, next(csv.reader([line])), number, path)) for number, line in lines[1:]]
-    return [(number, _cells(_TUM, line.replace(",", " ").split(), number, path)) for number, line in lines]
+class PoseLine(NamedTuple):
+    """Pose of one line; it has a time, the file of a cloud, or both."""
+
+    place: CameraPlace
+    stamp_s: float | None
+    file: str = ""
+
+
+class PoseReader:
+    """Reads poses line by line; the first line tells the columns.
+
+    Args:
+        path: named in errors.
+        defaults: errors, frame and axes of poses without their own.
+
+    Raises:
+        DoorFileError: there are no such axes.
+    """
+
+    def __init__(self, path: Path, defaults: PoseDefaults = DEFAULTS) -> None:
+        try:
+            self._defaults = defaults._replace(axes=parse_axes(defaults.axes))
+        except CameraError as error:
+            raise DoorFileError(error.message, field=error.field, expected=error.expected) from error
+        self._path = path
+        self._names: Sequence[str] = ()
+
+    @property
+    def has_lines(self) -> bool:
+        """True after the first line that is neither empty nor a comment."""
+        return bool(self._names)
+
+    def read(self, line: str, number: int) -> PoseLine | None:
+        """Return the pose of a line; None for a header, a comment and an empty line.
+
+        Args:
+            line: line.
+            number: its number, named in errors.
+
+        Raises:
+            DoorFileError: the line has another format.
+        """
+        line, path = line.strip(), self._path
+        if not line or line.startswith("#"):
+            return None
+        is_table = self._names is not _TUM
+        if not self._names:
+            is_table = not _starts_with_number(line)
+            names = [name.strip() for name in next(csv.reader([line]))] if is_table else _TUM
+            if is_table:
+                _check_columns(names, number, path)
+            self._names = names
+            if is_table:
+                return None
+        cells = next(csv.reader([line])) if is_table else line.replace(",", " ").split()
+        row = _cells(self._names, cells, number, path)
+        numbers = {
+            name: _number(value, name, number, path)
+            for name, value in row.items()
+            if name in _NUMBERS and value
+        }
+        place = _place(row, numbers, self._defaults, number, path)
+        pose = PoseLine(place, numbers.get("time"), row.get("file", ""))
+        if pose.stamp_s is None and not pose.file:
+            raise _error(path, number, "has neither a time nor a file", "time")
+        return pose
 
 
 def _starts_with_number(line: str) -> bool:

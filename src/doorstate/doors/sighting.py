@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple, Self
 
@@ -170,7 +170,7 @@ def why_hidden(place: tuple[float, float, float], view: View) -> tuple[NotSeenCo
     return ("along_wall", "") if beside_deg > _MAX_BESIDE_DEG else None
 
 
-def names_of_doors(record: Mapping[str, Any], names: tuple[str | None, ...]) -> dict[str, Any]:
+def names_of_doors(record: Mapping[str, Any], names: Sequence[str | None]) -> dict[str, Any]:
     """Return a record of a prediction with the name of each of its doors, as `prediction_values` lists them."""
     if not record.get("doors"):
         return dict(record)

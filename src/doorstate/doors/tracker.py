@@ -102,8 +102,7 @@ class DoorTracker:
             frame: name of the cloud, for events.
             ask: asks for doors in view that were not found.
         """
-        events = self._lose(stamp_s)
-        self._stamp_s = stamp_s
+        events = self._begin(stamp_s)
         found: dict[str, Sighting] = {}
         names: tuple[str | None, ...] = (None,) * len(prediction.doors)
         if isinstance(camera, CameraPlace):
@@ -119,13 +118,24 @@ class DoorTracker:
         changes = (self._change(sighting, stamp_s, frame) for sighting in sightings)
         return TrackedFrame(sightings, names, (*events, *(event for event in changes if event is not None)))
 
+    def miss(self, reason: str, stamp_s: float) -> TrackedFrame:
+        """Add a moment without a cloud: no door is seen, for a reason that a user can read.
+
+        Args:
+            reason: why there is no cloud.
+            stamp_s: time of the moment, as for `update`.
+        """
+        events = self._begin(stamp_s)
+        missed = (Sighting(door.id, code="refused", detail=reason) for door in self._doors)
+        return TrackedFrame(tuple(self._track(sighting, stamp_s) for sighting in missed), (), tuple(events))
+
     def end(self) -> tuple[DoorEvent, ...]:
         """Return the events that let every door count as not seen, at the end of a stream."""
         return tuple(self._lost(name) for name, track in self._tracks.items() if track.reported != NOT_SEEN)
 
-    def _lose(self, stamp_s: float) -> list[DoorEvent]:
+    def _begin(self, stamp_s: float) -> list[DoorEvent]:
         """Return the events of doors that have not been seen for too long, or all where the clock went back."""
-        has_gone_back = stamp_s < self._stamp_s
+        has_gone_back, self._stamp_s = stamp_s < self._stamp_s, stamp_s
         events = [
             self._lost(name)
             for name, track in self._tracks.items()

@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from itertools import zip_longest
 from typing import NamedTuple
 
 import numpy as np
@@ -59,19 +61,23 @@ class LeafPlan(NamedTuple):
         return place
 
 
-def door_lines(prediction: Prediction, floor_z_m: float, *, refused: bool = False) -> list[Line]:
-    """Return the lines of all doors of a prediction; labels number them where there are several.
+def door_lines(
+    prediction: Prediction, floor_z_m: float, *, refused: bool = False, names: Sequence[str] = ()
+) -> list[Line]:
+    """Return the lines of all doors of a prediction; labels name them, or number them where there are several.
 
     Args:
         prediction: a prediction; without doors there is nothing to draw.
         floor_z_m: height of the floor in the level sensor frame, for doors without their own.
         refused: draw candidates that are no doors as well, with their reasons.
+        names: name of each door; without names there are numbers.
     """
     several = len(prediction.doors) > 1
+    labels = names or (range(1, len(prediction.doors) + 1) if several else ())
     lines = []
-    for number, door in enumerate(prediction.doors, 1):
-        label = f"{number}: {door.label.replace('_', '-')}" if several else ""
-        lines += _lines(door, floor_z_m, label)
+    for label, door in zip_longest(labels, prediction.doors):
+        text = "" if label is None else f"{label}: {door.label.replace('_', '-')}"
+        lines += _lines(door, floor_z_m, text)
     for door in prediction.refused if refused else ():
         lines.append(Line("refused", _frame(door, floor_z_m, _REFUSED_HEIGHT_M), _short_reason(door)))
     return lines

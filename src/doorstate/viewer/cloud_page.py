@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from doorstate.clouds.floor import lowest_z_m
 from doorstate.clouds.measured import is_measured
 from doorstate.clouds.preparation import NUM_POINTS
+from doorstate.doors.sighting import UNKNOWN_DOOR, names_of_doors
 from doorstate.doorways.finder import thinned
 from doorstate.errors import DoorstateError, WriteParameter, python_parameter
 from doorstate.inference.door_lines import Line, door_lines
@@ -89,7 +90,7 @@ def make_live_entry(
     named: NamedCloud,
     facts: Sequence[tuple[str, str]],
     parameter: WriteParameter = python_parameter,
-    shown: Shown = SHOWN,
+    names: Sequence[str | None] = (),
 ) -> Entry:
     """Encode a prediction that was made elsewhere, with the cloud alone.
 
@@ -98,42 +99,48 @@ def make_live_entry(
         named: cloud; an error without one.
         facts: names and texts to list besides those of the prediction.
         parameter: how errors write parameters.
-        shown: candidates to draw.
+        names: name of each door of a list; None for one that is not in it.
     """
     entry: Entry = {"name": named.name, "truth": "", "facts": list(facts)}
     if isinstance(named.cloud, DoorstateError):
         return entry | {"error": named.cloud.describe(parameter, with_path=False)}
-    encoded = _encode_prediction(prediction, named, parameter, shown)
+    encoded = _encode_prediction(prediction, named, parameter, SHOWN, names)
     return entry | encoded | {"cloud": encoded["whole"]}
 
 
 def _encode_prediction(
-    prediction: Prediction, named: NamedCloud, parameter: WriteParameter, shown: Shown
+    prediction: Prediction,
+    named: NamedCloud,
+    parameter: WriteParameter,
+    shown: Shown,
+    names: Sequence[str | None] = (),
 ) -> Entry:
     assert not isinstance(named.cloud, DoorstateError)
     whole = thin_for_display(named.cloud)
     if prediction.tilt is not None:
         whole = prediction.tilt.to_level(whole)
     floor_z_m = lowest_z_m(whole)
+    record = prediction_to_dict(prediction, parameter, named.pose)
+    labels = [name or UNKNOWN_DOOR for name in names]
     return {
-        "prediction": prediction_to_dict(prediction, parameter, named.pose),
+        "prediction": names_of_doors(record, names) if names else record,
         "whole": encode_cloud(whole),
         "floor_z_m": round(floor_z_m, 3),
-        "plan": _plan(named.cloud, prediction, floor_z_m),
+        "plan": _plan(named.cloud, prediction, floor_z_m, names),
         "detections": [
             *encode_detections(prediction.detections),
-            *map(_encode_line, door_lines(prediction, floor_z_m, refused=shown.refused)),
+            *map(_encode_line, door_lines(prediction, floor_z_m, refused=shown.refused, names=labels)),
         ],
     }
 
 
-def _plan(cloud: Points, prediction: Prediction, floor_z_m: float) -> str:
+def _plan(cloud: Points, prediction: Prediction, floor_z_m: float, names: Sequence[str | None]) -> str:
     """Return the doors from above as SVG; empty without any."""
     if not prediction.doors:
         return ""
     sample = thinned(cloud)
     level = sample if prediction.tilt is None else prediction.tilt.to_level(sample)
-    return plan_svg(make_plan(prediction, walls=plan_walls(level, floor_z_m)), px_per_m=_PLAN_PX_PER_M)
+    return plan_svg(make_plan(prediction, names, plan_walls(level, floor_z_m)), px_per_m=_PLAN_PX_PER_M)
 
 
 def thin_for_display(cloud: Points, count: int = WHOLE_POINTS) -> Points:
