@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from doorstate._onnxruntime import open_session
 from doorstate.doorways.elevation import Elevation
 from doorstate.doorways.plan_lines import Floats
 
@@ -98,4 +99,4 @@ def _session() -> InferenceSession:
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1
     model = files("doorstate.doorways").joinpath("column_scorer.onnx").read_bytes()
-    return onnxruntime.InferenceSession(model, options, providers=["CPUExecutionProvider"])
+    return open_session(model, options)

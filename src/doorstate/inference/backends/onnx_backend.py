@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from doorstate._onnxruntime import open_session
 from doorstate.errors import WeightsError, summarize_exception
 from doorstate.inference.abstention import AbstentionCode
 from doorstate.inference.backends.base import Outputs
@@ -135,8 +136,8 @@ def _open_session(path: Path, threads: int, weights: Path | None, spinning: bool
         }
         options.add_external_initializers(list(tensors), list(tensors.values()))
     try:
-        return onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
-    except Exception as error:  # onnxruntime's errors have no common class of their own
+        return open_session(content, options)
+    except Exception as error:
         if any(word in str(error) for word in _NEWER):
             raise WeightsError(
                 f"is too new for onnxruntime {onnxruntime.__version__}",
