@@ -38,7 +38,7 @@ from .targets import TARGET_COLUMNS, seen_by_xtion
 WEIGHTS = "doorways-longer"  # experiment of the default weights
 RULES = "doorways-rules"
 NETWORK = "pointnet2"
-PROTOCOLS = ("by-pose",)  # of `ogurob`, with crops too
+PROTOCOLS = ("paper", "by-pose")  # of `ogurob`, with crops too
 _POSE = ("door_x_m", "door_y_m", "door_yaw_deg", "opening_width_m")
 
 
