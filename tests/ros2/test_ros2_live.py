@@ -9,7 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from pathlib import Path
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,10 @@ pytest.importorskip("rclpy")
 import rclpy
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from doorstate_ros.settings import NodeSettings
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
+from rcl_interfaces.msg import SetParametersResult
 from rclpy.parameter import Parameter
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
@@ -28,13 +32,12 @@ from std_msgs.msg import Bool, Header, String
 from visualization_msgs.msg import Marker, MarkerArray
 
 from doorstate.inference.predictor import Predictor
-from doorstate.inference.watch_settings import WatchSettings
 from doorstate.io.sensor_pose import camera_pose
 from doorstate.simulation.frames import replay
 from doorstate.simulation.presets import PRESETS, draw_rows
 from doorstate.types import Points
+from tests.ros2.package import PACKAGE
 
-PACKAGE = Path(__file__).resolve().parents[2] / "ros2" / "doorstate_ros"
 POINTS = 256
 NETWORK = "ogurob-pointnet2"  # trained on the door of these frames
 STEP = 4  # in the image: small messages are not lost on loopback
@@ -169,6 +172,7 @@ def processes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, su
             ),
             "second": start(*(word for each in second for word in ("-p", each)), "-r", "__ns:=/second"),
             "wrong": start("-p", "ponits:=512"),
+            "no tf": start("-p", "gravity_frame:=odom"),
         }  # fmt: skip
         rclpy.init()
         try:
@@ -252,17 +256,50 @@ def test_nothing_measured_is_unknown_at_once_and_silence_too(robot: Robot, cloud
     robot.wait_until(lambda: robot.states()[-1] == "unknown", "unknown state")
 
 
-def test_parameters_can_be_read_and_not_changed(robot: Robot) -> None:
+def test_some_parameters_change_at_once_and_impossible_values_change_nothing(robot: Robot) -> None:
     client = AsyncParameterClient(robot.node, "/doorstate")
     assert client.wait_for_services(timeout_sec=TIMEOUT_S)
     listed = client.list_parameters([], 10)
     rclpy.spin_until_future_complete(robot.node, listed, timeout_sec=TIMEOUT_S)
-    assert set(WatchSettings.model_fields) <= set(listed.result().result.names)
-    changed = client.set_parameters([Parameter("points", value=1024)])
-    rclpy.spin_until_future_complete(robot.node, changed, timeout_sec=TIMEOUT_S)
-    (result,) = changed.result().results
-    assert not result.successful
-    assert "read-only" in result.reason
+    assert set(NodeSettings.model_fields) <= set(listed.result().result.names)
+
+    def change(name: str, value: object) -> SetParametersResult:
+        changed = client.set_parameters([Parameter(name, value=value)])
+        rclpy.spin_until_future_complete(robot.node, changed, timeout_sec=TIMEOUT_S)
+        return changed.result().results[0]
+
+    assert change("hold_s", 0.2).successful
+    for name, value in (("points", 1024), ("hold_s", -1.0), ("tilt", "sideways")):
+        result = change(name, value)
+        assert not result.successful
+        assert name in result.reason
+    read = client.get_parameters(["hold_s", "points"])
+    rclpy.spin_until_future_complete(robot.node, read, timeout_sec=TIMEOUT_S)
+    assert [value.double_value or value.integer_value for value in read.result().values] == [0.2, POINTS]
+
+
+def test_a_node_that_is_deactivated_says_unknown_and_goes_on_when_it_is_activated(
+    robot: Robot, clouds: list[Points]
+) -> None:
+    service = robot.node.create_client(ChangeState, "/doorstate/change_state")
+    assert service.wait_for_service(timeout_sec=TIMEOUT_S)
+
+    def change(number: int) -> bool:
+        changed = service.call_async(ChangeState.Request(transition=Transition(id=number)))
+        rclpy.spin_until_future_complete(robot.node, changed, timeout_sec=TIMEOUT_S)
+        return bool(changed.result().success)
+
+    robot.publish(clouds[0], lambda: robot.states()[-1:] == ["closed"])
+    assert change(Transition.TRANSITION_DEACTIVATE)
+    robot.wait_until(lambda: robot.states()[-1] == "unknown", "unknown state")
+    robot.forget()
+    deadline_s = time.monotonic() + 1.0
+    robot.publish(clouds[0], lambda: time.monotonic() > deadline_s)
+    assert robot.states() == []
+    assert change(Transition.TRANSITION_CLEANUP)
+    assert change(Transition.TRANSITION_CONFIGURE)
+    assert change(Transition.TRANSITION_ACTIVATE)
+    robot.publish(clouds[0], lambda: robot.states()[-1:] == ["closed"])
 
 
 def test_of_many_depth_images_at_once_the_newest_is_reported(robot: Robot, clouds: list[Points]) -> None:
@@ -314,6 +351,14 @@ def test_a_misspelt_parameter_is_one_line_and_an_exit_code(
     assert errors.startswith("doorstate_ros: ")
     assert "ponits" in errors
     assert errors.count("\n") == 1
+
+
+@pytest.mark.skipif(find_spec("tf2_ros") is not None, reason="tf2_ros is installed")
+def test_frames_without_tf_are_one_line_and_an_exit_code(processes: dict[str, subprocess.Popen[str]]) -> None:
+    _, errors = processes["no tf"].communicate(timeout=TIMEOUT_S)
+    assert processes["no tf"].returncode == 1
+    assert errors.splitlines()[-1].startswith("doorstate_ros: ")
+    assert "tf2_ros" in errors
 
 
 @pytest.mark.parametrize(("name", "number"), [("first", signal.SIGINT), ("second", signal.SIGTERM)])

@@ -14,14 +14,15 @@ from xml.etree import ElementTree
 
 import pytest
 import yaml
+from doorstate_ros.settings import LIVE, NodeSettings, parse_node_settings
 
 import doorstate
 from doorstate.inference.watch import DoorWatch
-from doorstate.inference.watch_settings import WatchSettings, parse_settings
+from doorstate.inference.watch_settings import WatchSettings
+from tests.ros2.package import PACKAGE, ROS2
 
-ROS2 = Path(__file__).resolve().parents[2] / "ros2"
-PACKAGE = ROS2 / "doorstate_ros"
-NODE = (PACKAGE / "doorstate_ros" / "node.py").read_text(encoding="utf-8")
+SOURCES = {path.stem: path.read_text(encoding="utf-8") for path in (PACKAGE / "doorstate_ros").glob("*.py")}
+NODE = SOURCES["node"]
 LAUNCH = PACKAGE / "launch" / "doorstate.launch.py"
 README = (ROS2 / "README.md").read_text(encoding="utf-8")
 MANIFEST = ElementTree.parse(PACKAGE / "package.xml").getroot()
@@ -40,7 +41,7 @@ def imported(source: str) -> set[str]:
     """Top-level packages."""
     found = set()
     for node in ast.walk(ast.parse(source)):
-        if isinstance(node, ast.ImportFrom):
+        if isinstance(node, ast.ImportFrom) and node.level == 0:
             found.add(str(node.module).partition(".")[0])
         elif isinstance(node, ast.Import):
             found |= {alias.name.partition(".")[0] for alias in node.names}
@@ -90,23 +91,23 @@ def test_the_entry_point_is_a_function_of_the_node(setup_arguments: dict[str, An
 
 
 def test_imports_are_declared() -> None:
-    used = imported(NODE) | imported(LAUNCH.read_text(encoding="utf-8"))
+    used = set().union(*map(imported, (*SOURCES.values(), LAUNCH.read_text(encoding="utf-8"))))
     declared = {element.text for element in MANIFEST.iter("exec_depend")}
-    assert used - set(sys.stdlib_module_names) - {"doorstate"} == declared
+    assert used - set(sys.stdlib_module_names) - {"doorstate", "pydantic"} == declared
 
 
 def test_the_parameter_file_holds_every_parameter_with_its_default() -> None:
     content = yaml.safe_load((PACKAGE / "config" / "doorstate.yaml").read_text(encoding="utf-8"))
     parameters = content["/**"]["ros__parameters"]
-    assert list(parameters) == list(WatchSettings.model_fields)
-    assert parse_settings(parameters) == WatchSettings()
+    assert list(parameters) == list(NodeSettings.model_fields)
+    assert parse_node_settings(parameters) == NodeSettings()
     for name, value in parameters.items():  # ROS takes a double without a point for an integer
-        assert type(value) is type(WatchSettings.model_fields[name].default), name
+        assert type(value) is type(NodeSettings.model_fields[name].default), name
 
 
 def test_the_readme_lists_every_parameter_default_and_value() -> None:
-    listed = dict(re.findall(r"^\| `(\w+)` \| `([^`]*)` \|", README, flags=re.MULTILINE))
-    defaults = {name: str(field.default) for name, field in WatchSettings.model_fields.items()}
+    listed = dict(re.findall(r"^\| `(\w+)`\*? \| `([^`]*)` \|", README, flags=re.MULTILINE))
+    defaults = {name: str(field.default) for name, field in NodeSettings.model_fields.items()}
     shown = {
         name: value.replace('""', "").replace("true", "True").replace("false", "False")
         for name, value in listed.items()
@@ -114,6 +115,10 @@ def test_the_readme_lists_every_parameter_default_and_value() -> None:
     assert {name: shown.get(name) for name in defaults} == defaults
     for name in DoorWatch(WatchSettings(rule="depth_region")).report_silence(0).values:
         assert f"`{name}`" in README, name
+
+
+def test_the_readme_marks_the_parameters_that_change_at_once() -> None:
+    assert set(re.findall(r"^\| `(\w+)`\* \|", README, flags=re.MULTILINE)) == LIVE
 
 
 def test_the_launch_file_compiles_and_names_the_topics_of_the_node() -> None:
@@ -124,7 +129,7 @@ def test_the_launch_file_compiles_and_names_the_topics_of_the_node() -> None:
         for node in ast.parse(source).body
         if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "TOPICS"
     )
-    assert set(topics) == set(WatchSettings.model_fields["input"].annotation.__args__) | {"camera_info"}
+    assert set(topics) == set(NodeSettings.model_fields["input"].annotation.__args__) | {"camera_info"}
     assert "camera_info" in strings(NODE)
     assert "config" in strings(source)
     for topic in topics:

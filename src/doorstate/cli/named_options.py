@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -15,13 +15,13 @@ from doorstate.cli.shared_options import with_shared_options
 from doorstate.errors import ConfigError, DoorFileError
 
 if TYPE_CHECKING:
-    from doorstate.cameras.watcher import CameraReport
     from doorstate.doors.camera_place import CameraPlace, MissingPlace
     from doorstate.doors.history import DoorHistory
+    from doorstate.doors.live_doors import LiveDoors
     from doorstate.doors.named_predictor import NamedPrediction
     from doorstate.doors.pose_file import PoseFile
     from doorstate.doors.pose_stream import PoseStream
-    from doorstate.doors.tracker import DoorTracker, TrackedFrame
+    from doorstate.doors.tracker import DoorTracker
     from doorstate.inference.predictor import Predictor
     from doorstate.io.sensor_pose import PosedCloud
 
@@ -194,37 +194,9 @@ class NamedDoors:
         found = predict_named(
             predictor, cloud.points, cloud.pose, tracker, place, stamp_s or 0.0, frame=frame, asks=self.asks
         )
-        self._record(found.tracked, tracker, stamp_s or 0.0)
-        return found
-
-    def follow(self, predictor: Predictor, report: CameraReport) -> TrackedFrame:
-        """Name the doors of a live camera's report, and add what changed to the history.
-
-        Raises:
-            DoorFileError: the history cannot be written any more.
-        """
-        from doorstate.doors.named_predictor import name_doors
-
-        prediction, stamp_s = report.door.prediction, report.door.stamp_ns / 1e9
-        if report.points is None:
-            tracked = self.tracker.miss(prediction.reason, stamp_s)
-        else:
-            tracked = name_doors(
-                prediction,
-                predictor,
-                report.points,
-                report.door.pose,
-                self.tracker,
-                self.poses.at(stamp_s),
-                stamp_s,
-                asks=self.asks,
-            )
-        self._record(tracked, self.tracker, stamp_s)
-        return tracked
-
-    def _record(self, tracked: TrackedFrame, tracker: DoorTracker, stamp_s: float) -> None:
         if self.history is not None:
-            self.history.record(tracked.events, tracker.last_seen, stamp_s)
+            self.history.record(found.tracked.events, tracker.last_seen, stamp_s)
+        return found
 
 
 @dataclass(frozen=True)
@@ -244,22 +216,40 @@ class NamedOptions:
             yield None
             return
         from doorstate.doors.door_file import read_doors
-        from doorstate.doors.history import DoorHistory
         from doorstate.doors.tracker import DoorTracker
 
         list_ = read_doors(self.doors).doors
         assert self.poses is not None
         named = NamedDoors(DoorTracker(list_), self.poses, self.asks, lambda: DoorTracker(list_))
-        with ExitStack() as stack:
-            if self.poses.stream is not None:
-                stack.enter_context(self.poses.stream)
-            if self.history is not None:
-                named.history = stack.enter_context(DoorHistory(self.history, self.history_days))
+        with self._open_history() as named.history:
             try:
                 yield named
             finally:
                 if named.history is not None:
                     named.history.record(named.tracker.end(), {})
+
+    @contextmanager
+    def open_live(self, predictor: Predictor) -> Iterator[LiveDoors | None]:
+        """Yield the same for the reports of a live camera, whose poses are read meanwhile."""
+        if self.doors is None:
+            yield None
+            return
+        from doorstate.doors.door_file import read_doors
+        from doorstate.doors.live_doors import LiveDoors
+
+        list_ = read_doors(self.doors).doors
+        assert self.poses is not None
+        with self.poses.stream or nullcontext(), self._open_history() as history:
+            live = LiveDoors(list_, predictor, history, asks=self.asks)
+            try:
+                yield live
+            finally:
+                live.end()
+
+    def _open_history(self) -> AbstractContextManager[DoorHistory | None]:
+        from doorstate.doors.history import DoorHistory
+
+        return nullcontext() if self.history is None else DoorHistory(self.history, self.history_days)
 
 
 def read_named_options(

@@ -36,9 +36,9 @@ if TYPE_CHECKING:
     from doorstate.cameras.device import DepthFrame
     from doorstate.cameras.grabber import FrameGrabber
     from doorstate.cameras.watcher import CameraReport
-    from doorstate.cli.named_options import NamedDoors
+    from doorstate.cli.named_options import CameraPoses
     from doorstate.cli.watch_output import Show
-    from doorstate.inference.predictor import Predictor
+    from doorstate.doors.live_doors import LiveDoors
     from doorstate.mqtt.publisher import MqttPublisher
 
 _SIZE = re.compile(r"(\d{1,5})x(\d{1,5})")
@@ -170,24 +170,28 @@ def watch(
                 recorder.write(frame, day_time.stamp_ns(frame.captured_s))
 
         grabber = stack.enter_context(FrameGrabber(device, request, on_frame=keep))
-        doors = stack.enter_context(named.open())
         predictor = load_predictor(methods, points, budget_ms=budget_ms, threads=threads)
+        doors = stack.enter_context(named.open_live(predictor))
         watched = CameraWatch(settings, predictor, accelerometer=accelerometer, day_time=day_time)
         publisher = stack.enter_context(mqtt.open())
         with show_reports(
             predictor, as_json=as_json, view=view, port=port, open_browser=open_browser
         ) as show:
-            reports = _name(watched.follow(grabber), predictor, doors)
+            reports = _name(watched.follow(grabber), doors, named.poses)
             answered = _follow(_publish(reports, publisher), show, seconds)
     _print_end(grabber, answered, None if recorder is None else recorder.frames, record)
 
 
 def _name(
-    reports: Iterable[CameraReport], predictor: Predictor, doors: NamedDoors | None
+    reports: Iterable[CameraReport], doors: LiveDoors | None, poses: CameraPoses | None
 ) -> Iterator[CameraReport]:
     """Yield the reports, with the doors of a list where there is one."""
     for report in reports:
-        yield report if doors is None else replace(report, named=doors.follow(predictor, report))
+        if doors is None or poses is None:
+            yield report
+            continue
+        camera = poses.at(report.door.stamp_ns / 1e9)
+        yield replace(report, named=doors.follow(report.door, report.points, camera))
 
 
 def _publish(reports: Iterable[CameraReport], publisher: MqttPublisher | None) -> Iterator[CameraReport]:

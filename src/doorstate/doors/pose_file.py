@@ -25,7 +25,13 @@ from doorstate.doors.camera_place import POSITION_ERROR_M, YAW_ERROR_DEG, Camera
 from doorstate.doors.named_door import DEFAULT_FRAME
 from doorstate.doors.plane_pose import PlanePose, turned_deg
 from doorstate.errors import CameraError, DoorFileError
-from doorstate.io.rotations import axes_matrix, heading_and_tilt_deg, parse_axes, quaternion_matrix
+from doorstate.io.rotations import (
+    Quaternion,
+    axes_matrix,
+    heading_and_tilt_deg,
+    parse_axes,
+    quaternion_matrix,
+)
 
 MAX_POSES_BYTES = 1 << 28
 MAX_GAP_S = 1.0  # between two poses that are interpolated; chosen: localisations publish at 1 to 50 Hz
@@ -134,8 +140,7 @@ def parse_place(text: str, defaults: PoseDefaults = DEFAULTS) -> CameraPlace:
         raise DoorFileError(
             f"{text!r} is no pose", field="pose", expected="three numbers: x y yaw"
         ) from error
-    pose = PlanePose(x_m, y_m, turned_deg(yaw_deg))
-    return CameraPlace(pose, defaults.frame, defaults.position_error_m, defaults.yaw_error_deg)
+    return _at((x_m, y_m), yaw_deg, defaults)
 
 
 class PoseLine(NamedTuple):
@@ -249,21 +254,43 @@ def _place(
     missing = next((name for name in names if name not in numbers), None)
     if missing is not None:
         raise _error(path, line, "has no value", missing)
+    position_m = numbers["x"], numbers["y"]
     if "qw" in row:
         x, y, z, w = (numbers[name] for name in _FULL[3:])
         try:
-            camera = np.array(quaternion_matrix((x, y, z, w))) @ np.array(axes_matrix(defaults.axes)).T
-            yaw_deg, _, _ = heading_and_tilt_deg(camera)
+            place = place_of(position_m, (x, y, z, w), defaults)
         except CameraError as error:
             raise _error(path, line, error.message, "qx", error.expected) from error
     else:
-        yaw_deg = numbers["yaw"]
-    return CameraPlace(
-        PlanePose(numbers["x"], numbers["y"], turned_deg(yaw_deg)),
-        row.get("frame") or defaults.frame,
-        numbers.get("position_error_m", defaults.position_error_m),
-        numbers.get("yaw_error_deg", defaults.yaw_error_deg),
+        place = _at(position_m, numbers["yaw"], defaults)
+    return place._replace(
+        frame=row.get("frame") or defaults.frame,
+        position_error_m=numbers.get("position_error_m", defaults.position_error_m),
+        yaw_error_deg=numbers.get("yaw_error_deg", defaults.yaw_error_deg),
     )
+
+
+def place_of(
+    position_m: tuple[float, float], quaternion: Quaternion, defaults: PoseDefaults = DEFAULTS
+) -> CameraPlace:
+    """Return the pose of a camera in plan view.
+
+    Args:
+        position_m: x and y of the camera in the map.
+        quaternion: rotation (x, y, z, w) from the frame of the camera to the map.
+        defaults: errors, frame of the map, and axes of the camera's frame.
+
+    Raises:
+        CameraError: no rotation, no such axes, or a camera that looks straight up or down.
+    """
+    axes = np.array(axes_matrix(parse_axes(defaults.axes)))
+    yaw_deg, _, _ = heading_and_tilt_deg(np.array(quaternion_matrix(quaternion)) @ axes.T)
+    return _at(position_m, yaw_deg, defaults)
+
+
+def _at(position_m: tuple[float, float], yaw_deg: float, defaults: PoseDefaults) -> CameraPlace:
+    pose = PlanePose(*position_m, turned_deg(yaw_deg))
+    return CameraPlace(pose, defaults.frame, defaults.position_error_m, defaults.yaw_error_deg)
 
 
 def _error(path: Path, line: int, message: str, name: str, expected: str | None = None) -> DoorFileError:

@@ -27,6 +27,7 @@ from doorstate.io.calibration import calibration_from_message, is_rectified
 from doorstate.io.camera import Intrinsics
 from doorstate.io.messages import CLOUD, cloud_from_message, stamp_ns_of
 from doorstate.io.options import DEFAULT_OPTIONS
+from doorstate.io.rotations import Quaternion
 from doorstate.io.sensor_pose import PosedCloud, SensorPose
 from doorstate.rules.base import Detection
 from doorstate.types import DoorState, Points
@@ -59,9 +60,27 @@ class DoorWatch:
         self._reset()
 
     @property
+    def predictor(self) -> Predictor:
+        """Network or rule."""
+        return self._predictor
+
+    @property
     def predictor_name(self) -> str:
         """Description of the network or rule, for a log."""
         return str(self._predictor)
+
+    def change(self, settings: WatchSettings) -> None:
+        """Use other settings from the next message on; what came earlier is forgotten where clouds are read otherwise.
+
+        Input, network and rule stay as they are.
+
+        Raises:
+            DoorstateError: an impossible value.
+        """
+        options, door_known = settings.read_options(), settings.known_door()
+        if (options, door_known) != (self._options, self._door_known):
+            self._reset()
+        self._settings, self._options, self._door_known = settings, options, door_known
 
     def is_due(self, now_s: float) -> bool:
         """Return True if a message that comes now is to be processed, by `max_hz`.
@@ -97,7 +116,26 @@ class DoorWatch:
             received_ns: stamp to use if the message has none.
         """
         stamp_ns = stamp_ns_of(message) or received_ns
-        return self.report(lambda: self._cloud(message), stamp_ns, str(message.header.frame_id))
+        return self.report(lambda: self.cloud(message), stamp_ns, str(message.header.frame_id))
+
+    def cloud(self, message: Any, rotation: Quaternion | None = None) -> PosedCloud:
+        """Return the cloud of a message in the body frame.
+
+        Args:
+            message: message of the topic.
+            rotation: from the frame of the message to a level frame, in place of the tilt of the settings.
+
+        Raises:
+            DoorstateError: the message cannot be read, or an image has no camera yet.
+        """
+        options = self._options
+        if rotation is not None:
+            options = replace(options, quaternion=rotation, roll_deg=None, pitch_deg=None)
+        if self._type != CLOUD:
+            if isinstance(self._camera, CameraError):
+                raise self._camera
+            options = replace(options, intrinsics=self._camera)
+        return cloud_from_message(message, self._type, options)
 
     def report(
         self, read: Callable[[], PosedCloud], stamp_ns: int, frame_id: str, steady_s: float | None = None
@@ -171,14 +209,6 @@ class DoorWatch:
             sentence = f"damaged message ({summarize_exception(error)})"
             abstention = Abstention("damaged_message", message=sentence)
         return _Seen(sample, pose, Prediction.abstain(abstention))
-
-    def _cloud(self, message: Any) -> PosedCloud:
-        options = self._options
-        if self._type != CLOUD:
-            if isinstance(self._camera, CameraError):
-                raise self._camera
-            options = replace(options, intrinsics=self._camera)
-        return cloud_from_message(message, self._type, options)
 
 
 class _Seen(NamedTuple):

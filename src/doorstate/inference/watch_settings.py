@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 from pydantic import ConfigDict, Field, ValidationError
 
@@ -130,21 +130,29 @@ class WatchSettings(FrozenModel):
         return predictor
 
 
+Settings = TypeVar("Settings", bound=WatchSettings)
+
+
 def parse_settings(parameters: Mapping[str, Any]) -> WatchSettings:
     """Return the settings with these parameters, the others by default.
 
     Raises:
         ConfigError: a parameter does not exist, or cannot have this value.
     """
+    return parse_settings_as(WatchSettings, parameters)
+
+
+def parse_settings_as(kind: type[Settings], parameters: Mapping[str, Any]) -> Settings:
+    """Return settings with more parameters than those of a watch; errors are those of `parse_settings`."""
     try:
-        settings = WatchSettings(**parameters)
+        settings = kind(**parameters)
         settings.read_options()
         settings.known_door()
     except ValidationError as error:
         problem = error.errors()[0]
         name = str(problem["loc"][0])
         if problem["type"] == "extra_forbidden":
-            raise unknown_name("parameter", name, list(WatchSettings.model_fields)) from error
+            raise unknown_name("parameter", name, list(kind.model_fields)) from error
         raise ConfigError(f"{problem['input']!r}: {problem['msg'].lower()}", field=name) from error
     except CameraError as error:
         name = (error.field or "").removesuffix("_deg").removesuffix("_m")
