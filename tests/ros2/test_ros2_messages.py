@@ -4,9 +4,7 @@
 from __future__ import annotations
 
 import math
-import re
 from dataclasses import replace
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -30,27 +28,14 @@ from doorstate.io.sensor_pose import PosedCloud
 from doorstate.types import DoorState
 from tests.cameras.scripted import FixedPredictor
 from tests.doors.examples import AT_ORIGIN, named
-from tests.ros2.package import ROS2
+from tests.ros2.doors import CONSTANTS, DoorMessage
 
 WARNING = "module 'sre_"  # of the parser of lark-parser, which message types import
 pytestmark = pytest.mark.filterwarnings(f"ignore:{WARNING}:DeprecationWarning")
 
-DEFINITION = (ROS2 / "doorstate_msgs" / "msg" / "Door.msg").read_text(encoding="utf-8")
-FIELDS = re.findall(r"^[\w/]+(?:\[\d*\])? +([a-z]\w*)", DEFINITION, flags=re.MULTILINE)
-CONSTANTS = dict(re.findall(r"^uint8 ([A-Z_]+)=(\d)", DEFINITION, flags=re.MULTILINE))
 
-
-class DoorMessage(SimpleNamespace):
-    """Stand-in of doorstate_msgs/Door: it has the fields of the definition and no others."""
-
-    def __init__(self, **values: Any) -> None:
-        super().__init__(**dict.fromkeys(FIELDS) | {"pose": PoseWithCovariance()})
-        for name, value in values.items():
-            setattr(self, name, value)
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        assert name in FIELDS
-        super().__setattr__(name, value)
+def message(**values: Any) -> DoorMessage:
+    return DoorMessage(**{"pose": PoseWithCovariance()} | values)
 
 
 SURE = {"closed": 0.01, "semi_open": 0.01, "open": 0.98}
@@ -88,8 +73,8 @@ def tracked_by(report: DoorReport) -> TrackedFrame:
 
 def test_a_door_has_its_state_place_and_errors_and_others_of_the_list_a_reason() -> None:
     report = report_of(OPEN)
-    front, lab = messages.door_messages(DoorMessage, report, tracked_by(report))
-    assert (front.id, front.seen, front.state, front.reason) == ("front", True, int(CONSTANTS["OPEN"]), "")
+    front, lab = messages.door_messages(message, report, tracked_by(report))
+    assert (front.id, front.seen, front.state, front.reason) == ("front", True, CONSTANTS["OPEN"], "")
     assert front.probabilities == [0.01, 0.01, 0.98]
     assert (front.pose.pose.position.x, front.pose.pose.position.z) == pytest.approx((2.0, -1.0))
     assert front.pose.covariance[0] == pytest.approx(0.01)
@@ -101,14 +86,14 @@ def test_a_door_has_its_state_place_and_errors_and_others_of_the_list_a_reason()
 
 
 def test_a_door_without_a_list_has_no_name() -> None:
-    (door,) = messages.door_messages(DoorMessage, report_of(OPEN), None)
-    assert (door.id, door.state, door.last_state) == (None, int(CONSTANTS["OPEN"]), None)
+    (door,) = messages.door_messages(message, report_of(OPEN), None)
+    assert (door.id, door.state, door.last_state) == (None, CONSTANTS["OPEN"], None)
 
 
 def test_states_are_the_constants_of_the_definition() -> None:
     numbers = {name: messages._number(name.lower()) for name in CONSTANTS if name != "UNKNOWN"}
-    assert {name: str(number) for name, number in numbers.items()} | {"UNKNOWN": "0"} == CONSTANTS
-    assert messages._number(None) == int(CONSTANTS["UNKNOWN"])
+    assert numbers | {"UNKNOWN": 0} == CONSTANTS
+    assert messages._number(None) == CONSTANTS["UNKNOWN"]
 
 
 @pytest.mark.parametrize(("hinge", "from_m", "to_m"), [("left", -0.45, 0.35), ("right", 0.45, -0.35)])

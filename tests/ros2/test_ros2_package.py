@@ -25,13 +25,24 @@ SOURCES = {path.stem: path.read_text(encoding="utf-8") for path in (PACKAGE / "d
 NODE = SOURCES["node"]
 LAUNCH = PACKAGE / "launch" / "doorstate.launch.py"
 README = (ROS2 / "README.md").read_text(encoding="utf-8")
-MANIFEST = ElementTree.parse(PACKAGE / "package.xml").getroot()
+PAGES = README + (ROS2.parent / "docs" / "nav2-open-rmf.md").read_text(encoding="utf-8")
+
+
+@pytest.fixture(params=["doorstate_ros", "doorstate_nav"])
+def package(request: pytest.FixtureRequest) -> Path:
+    """Folder of a package in Python."""
+    return ROS2 / str(request.param)
 
 
 @pytest.fixture
-def setup_arguments(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+def manifest(package: Path) -> ElementTree.Element:
+    return ElementTree.parse(package / "package.xml").getroot()
+
+
+@pytest.fixture
+def setup_arguments(package: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     seen: dict[str, Any] = {}
-    monkeypatch.chdir(PACKAGE)
+    monkeypatch.chdir(package)
     monkeypatch.setattr("setuptools.setup", lambda **arguments: seen.update(arguments))
     runpy.run_path("setup.py")
     return seen
@@ -54,46 +65,61 @@ def strings(source: str) -> Iterator[str]:
             yield node.value
 
 
-def test_name_version_and_licence_are_the_same_everywhere(setup_arguments: dict[str, Any]) -> None:
+def test_name_version_and_licence_are_the_same_everywhere(
+    package: Path, manifest: ElementTree.Element, setup_arguments: dict[str, Any]
+) -> None:
     for key in ("name", "version", "license", "description", "maintainer"):
-        assert MANIFEST.findtext(key) == setup_arguments[key], key
+        assert manifest.findtext(key) == setup_arguments[key], key
     assert setup_arguments["version"] == doorstate.__version__
-    assert MANIFEST.findtext("export/build_type") == "ament_python"
-    assert setup_arguments["packages"] == [setup_arguments["name"]] == [PACKAGE.name]
-    assert f"/lib/{PACKAGE.name}" in (PACKAGE / "setup.cfg").read_text(encoding="utf-8")
+    assert manifest.findtext("export/build_type") == "ament_python"
+    assert setup_arguments["packages"] == [setup_arguments["name"]] == [package.name]
+    assert f"/lib/{package.name}" in (package / "setup.cfg").read_text(encoding="utf-8")
 
 
-def test_files_are_installed_where_ros_searches_them(setup_arguments: dict[str, Any]) -> None:
+@pytest.mark.parametrize("name", ["doorstate_msgs", "doorstate_bt"])
+def test_packages_of_cmake_have_the_version_too(name: str) -> None:
+    root = ElementTree.parse(ROS2 / name / "package.xml").getroot()
+    assert (root.findtext("name"), root.findtext("version")) == (name, doorstate.__version__)
+    assert f"project({name})" in (ROS2 / name / "CMakeLists.txt").read_text(encoding="utf-8")
+
+
+def test_files_are_installed_where_ros_searches_them(package: Path, setup_arguments: dict[str, Any]) -> None:
     installed = {
         f"{folder}/{Path(file).name}" for folder, files in setup_arguments["data_files"] for file in files
     }
-    share = f"share/{PACKAGE.name}"
+    share = f"share/{package.name}"
     wanted = {
         f"{share}/{folder}/{path.name}"
         for folder in ("launch", "config")
-        for path in (PACKAGE / folder).iterdir()
+        for path in (package / folder).iterdir()
     }
     assert installed == wanted | {
         f"{share}/package.xml",
-        f"share/ament_index/resource_index/packages/{PACKAGE.name}",
+        f"share/ament_index/resource_index/packages/{package.name}",
     }
     assert all(Path(file).is_file() for _, files in setup_arguments["data_files"] for file in files)
 
 
-def test_the_entry_point_is_a_function_of_the_node(setup_arguments: dict[str, Any]) -> None:
-    (entry,) = setup_arguments["entry_points"]["console_scripts"]
-    executable, target = entry.split(" = ")
-    assert target == "doorstate_ros.node:main"
-    functions = {node.name for node in ast.parse(NODE).body if isinstance(node, ast.FunctionDef)}
-    assert "main" in functions
-    assert executable in strings(LAUNCH.read_text(encoding="utf-8"))
-    assert f"ros2 run doorstate_ros {executable}" in README
+def test_entry_points_are_functions_that_launch_files_and_pages_name(
+    package: Path, setup_arguments: dict[str, Any]
+) -> None:
+    launched = set().union(
+        *(strings(path.read_text(encoding="utf-8")) for path in (package / "launch").iterdir())
+    )
+    for entry in setup_arguments["entry_points"]["console_scripts"]:
+        executable, target = entry.split(" = ")
+        module, function = target.split(":")
+        source = (package / f"{module.replace('.', '/')}.py").read_text(encoding="utf-8")
+        assert function in {node.name for node in ast.parse(source).body if isinstance(node, ast.FunctionDef)}
+        assert executable in launched or f"ros2 run {package.name} {executable}" in PAGES
+        assert f"{executable}" in PAGES
 
 
-def test_imports_are_declared() -> None:
-    used = set().union(*map(imported, (*SOURCES.values(), LAUNCH.read_text(encoding="utf-8"))))
-    declared = {element.text for element in MANIFEST.iter("exec_depend")}
-    assert used - set(sys.stdlib_module_names) - {"doorstate", "pydantic"} == declared
+def test_imports_are_declared(package: Path, manifest: ElementTree.Element) -> None:
+    files = [*(package / package.name).glob("*.py"), *(package / "launch").iterdir()]
+    used = set().union(*(imported(path.read_text(encoding="utf-8")) for path in files))
+    declared = {element.text for element in manifest.iter("exec_depend")}
+    assert used - set(sys.stdlib_module_names) - {"doorstate", "pydantic", package.name} == declared
 
 
 def test_the_parameter_file_holds_every_parameter_with_its_default() -> None:

@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Client of Nav2's route server: edges through doors are closed and opened (nav2_msgs/DynamicEdges)."""
+
+from __future__ import annotations
+
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+from nav2_msgs.srv import DynamicEdges
+from rclpy.node import Node
+
+from doorstate_nav.door_messages import parameter, remember_doors, spin
+from doorstate_nav.edges import EdgeKeeper, read_edge_table
+from doorstate_nav.memory import EXPIRE_S, DoorMemory
+
+SERVICE = "route_server/DynamicEdgesScorer/adjust_edges"
+
+
+class EdgeClient(Node):  # type: ignore[misc]  # rclpy has no types where it is not installed
+    """Compares doors and edges once a `period_s`, and asks for changes alone."""
+
+    def __init__(self) -> None:
+        super().__init__("doorstate_edges")
+        path = parameter(self, "edges", "", "Table of doors and edges (YAML).")
+        service = parameter(self, "service", SERVICE, "Service of the route server.")
+        period_s = parameter(self, "period_s", 0.5, "Time between two comparisons.")
+        expire_s = parameter(self, "expire_s", EXPIRE_S, "Time after which a state counts no more.")
+        self._table = read_edge_table(Path(path))
+        self._memory, self._keeper = DoorMemory(expire_s), EdgeKeeper(self._table)
+        self._client = self.create_client(DynamicEdges, service)
+        self._waits = False
+        remember_doors(self, self._memory)
+        self.create_timer(period_s, self._compare)
+
+    def _compare(self) -> None:
+        if not self._client.service_is_ready():
+            self._keeper.forget()
+            return
+        if self._waits:
+            return
+        now_s = time.monotonic()
+        doors = {entry.door: self._memory.at(entry.door, now_s) for entry in self._table.doors}
+        changes = self._keeper.changes(doors)
+        if changes.closed or changes.opened:
+            self._waits = True
+            request = DynamicEdges.Request(closed_edges=changes.closed, opened_edges=changes.opened)
+            self._client.call_async(request).add_done_callback(self._on_answer)
+
+    def _on_answer(self, future: Any) -> None:
+        self._waits = False
+        if future.exception() is not None or not future.result().success:
+            self.get_logger().warning("the route server did not change its edges: they are sent again")
+            self._keeper.forget()
+
+
+def main() -> int:
+    """Run the client."""
+    return spin(EdgeClient)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
