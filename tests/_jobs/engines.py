@@ -18,6 +18,7 @@ _SYSTEM = {
     "health_check_period_ms": 300,
     "health_check_timeout_ms": 500,
     "health_check_failure_threshold": 2,
+    "worker_niceness": 0,  # Ray's own lets every other process go first
 }
 
 

@@ -78,7 +78,7 @@ def results(folder: Path) -> dict[str, Any]:
 @pytest.fixture(scope="module")
 def experiment(small_dataset: PreparedDataset) -> Experiment:
     """Two trainings, one for each machine."""
-    changes = {"epochs": 24, "batch_size": 8, "precision": "fp32"}
+    changes = {"epochs": 8, "batch_size": 8, "precision": "fp32"}
     return small_experiment(
         small_dataset, networks=("pointnet2", "pointnet"), folds=1, recipe_changes=changes
     )
