@@ -35,7 +35,7 @@ def server(monkeypatch: pytest.MonkeyPatch) -> Any:
     from doorstate_nav.wait_server import WaitServer
 
     made = WaitServer.__new__(WaitServer)
-    made._memory = DoorMemory()
+    made._memory, made._waiting = DoorMemory(), 0
     return made
 
 
@@ -78,3 +78,4 @@ def test_a_goal_succeeds_aborts_or_is_cancelled(server: Any) -> None:
     cancelled = Handle(goal(door="lab"), cancel_after=2)
     assert server._execute(cancelled).reached is False
     assert cancelled.ended == ["cancelled"]
+    assert server._waiting == 0

@@ -31,8 +31,13 @@ def parameter(node: Any, name: str, default: Any, description: str) -> Any:
     return node.declare_parameter(name, default, descriptor).value
 
 
-def spin(make_node: Any) -> int:
-    """Run a node until it is stopped; return 1 after one line on standard error if it cannot start."""
+def spin(make_node: Any, threads: int = 1) -> int:
+    """Run a node until it is stopped; return 1 after one line on standard error if it cannot start.
+
+    Args:
+        make_node: makes the node.
+        threads: callbacks that run at the same time.
+    """
     import sys
 
     import rclpy
@@ -42,7 +47,7 @@ def spin(make_node: Any) -> int:
 
     rclpy.init()
     try:
-        rclpy.spin(make_node(), MultiThreadedExecutor())
+        rclpy.spin(make_node(), MultiThreadedExecutor(threads))
     except (DoorstateError, ValueError) as error:
         print(f"doorstate_nav: {' '.join(str(error).split())}", file=sys.stderr)  # noqa: T201
         return 1

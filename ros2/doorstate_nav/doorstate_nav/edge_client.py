@@ -15,6 +15,7 @@ from doorstate_nav.door_messages import parameter, remember_doors, spin
 from doorstate_nav.edges import EdgeKeeper, read_edge_table
 from doorstate_nav.memory import EXPIRE_S, DoorMemory
 
+_ANSWER_S = 5.0
 SERVICE = "route_server/DynamicEdgesScorer/adjust_edges"
 
 
@@ -30,26 +31,28 @@ class EdgeClient(Node):  # type: ignore[misc]  # rclpy has no types where it is 
         self._table = read_edge_table(Path(path))
         self._memory, self._keeper = DoorMemory(expire_s), EdgeKeeper(self._table)
         self._client = self.create_client(DynamicEdges, service)
-        self._waits = False
+        self._asked_s: float | None = None  # when a request was sent that has no answer yet
         remember_doors(self, self._memory)
         self.create_timer(period_s, self._compare)
 
     def _compare(self) -> None:
-        if not self._client.service_is_ready():
+        now_s = time.monotonic()
+        is_late = self._asked_s is not None and now_s - self._asked_s >= _ANSWER_S
+        if is_late or not self._client.service_is_ready():  # it was ended, or started again
+            self._asked_s = None
             self._keeper.forget()
             return
-        if self._waits:
+        if self._asked_s is not None:
             return
-        now_s = time.monotonic()
         doors = {entry.door: self._memory.at(entry.door, now_s) for entry in self._table.doors}
         changes = self._keeper.changes(doors)
         if changes.closed or changes.opened:
-            self._waits = True
+            self._asked_s = now_s
             request = DynamicEdges.Request(closed_edges=changes.closed, opened_edges=changes.opened)
             self._client.call_async(request).add_done_callback(self._on_answer)
 
     def _on_answer(self, future: Any) -> None:
-        self._waits = False
+        self._asked_s = None
         if future.exception() is not None or not future.result().success:
             self.get_logger().warning("the route server did not change its edges: they are sent again")
             self._keeper.forget()

@@ -17,15 +17,17 @@ from doorstate_nav.memory import EXPIRE_S, DoorMemory
 from doorstate_nav.waiting import DoorWait, Progress
 
 _STEP_S = 0.1
+MAX_GOALS = 16  # that wait at the same time, each in a thread
 
 
 class WaitServer(Node):  # type: ignore[misc]  # rclpy has no types where it is not installed
-    """Several goals at a time may wait."""
+    """At most `MAX_GOALS` goals wait at the same time."""
 
     def __init__(self) -> None:
         super().__init__("doorstate_wait")
         expire_s = parameter(self, "expire_s", EXPIRE_S, "Time after which a state counts no more.")
         self._memory = DoorMemory(expire_s)
+        self._waiting = 0
         group = ReentrantCallbackGroup()
         remember_doors(self, self._memory, callback_group=group)
         self._server = ActionServer(
@@ -44,9 +46,19 @@ class WaitServer(Node):  # type: ignore[misc]  # rclpy has no types where it is 
         except ValueError as error:
             self.get_logger().warning(f"goal refused: {error}")
             return GoalResponse.REJECT
+        if self._waiting >= MAX_GOALS:
+            self.get_logger().warning(f"goal refused: {MAX_GOALS} others are waiting")
+            return GoalResponse.REJECT
         return GoalResponse.ACCEPT
 
     def _execute(self, handle: Any) -> Any:
+        self._waiting += 1
+        try:
+            return self._wait(handle)
+        finally:
+            self._waiting -= 1
+
+    def _wait(self, handle: Any) -> Any:
         wait = DoorWait(handle.request, time.monotonic())
         while True:
             progress = wait.step(self._memory, time.monotonic())
@@ -73,7 +85,8 @@ def _result(progress: Progress) -> Any:
 
 def main() -> int:
     """Run the server."""
-    return spin(WaitServer)
+    # Two more, so that messages and cancellations come in while all goals wait.
+    return spin(WaitServer, MAX_GOALS + 2)
 
 
 if __name__ == "__main__":

@@ -31,7 +31,7 @@ from doorstate.doors.history import DoorHistory
 from doorstate.doors.live_doors import LiveDoors
 from doorstate.doors.pose_file import PoseDefaults
 from doorstate.doors.tracker import TrackedFrame
-from doorstate.errors import DoorstateError
+from doorstate.errors import DoorFileError, DoorstateError
 from doorstate.inference.backends import needs_torch
 from doorstate.inference.backends.threads import configure_torch
 from doorstate.inference.door_report import DoorReport
@@ -235,7 +235,12 @@ class DoorNode(LifecycleNode):  # type: ignore[misc]  # rclpy has no types where
                 settings.position_error_m, settings.yaw_error_deg, settings.map_frame, pose.axes
             )
             place = self._transforms.place(report.frame_id, defaults, report.stamp_ns, settings.tf_timeout_s)
-        return self._doors.follow(report, points, place)
+        try:
+            return self._doors.follow(report, points, place)
+        except DoorFileError as error:
+            self.get_logger().error(f"the history ends here: {one_line(error)}")
+            self._doors.drop_history()
+            return self._doors.follow(report, points, place)
 
     def _publish_silence(self) -> None:
         assert self._watch is not None
@@ -287,7 +292,10 @@ class DoorNode(LifecycleNode):  # type: ignore[misc]  # rclpy has no types where
     def close(self) -> None:
         """Give up everything that configuring opened; the history ends with all doors not seen."""
         if self._doors is not None:
-            self._doors.end()
+            try:
+                self._doors.end()
+            except DoorFileError as error:
+                self.get_logger().error(one_line(error))
         self._watch = self._doors = self._transforms = None
         self._stack.close()
 

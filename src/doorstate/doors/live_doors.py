@@ -67,6 +67,10 @@ class LiveDoors:
             self._history.record(tracked.events, self._tracker.last_seen, stamp_s)
         return tracked
 
+    def drop_history(self) -> None:
+        """Go on without the history, as after a disk that is full."""
+        self._history = None
+
     def end(self) -> None:
         """Let every door count as not seen, in the history too.
 
