@@ -24,8 +24,10 @@ from doorstate.training.comparison import compare
 from doorstate.training.experiment import Experiment
 from tests._jobs.engines import TwoMachines
 from tests.training.runs import read_results, small_experiment
+from tests.waiting import wait_until
 
 ONE = Resources(cpus=1)
+WAIT_S = 120.0
 SMALL = PRESETS["varied"].model_copy(update={"camera": DepthCamera(width=160, height=120)})
 SETTINGS = SimulationSettings(preset=SMALL, seed=6, poses=64)  # eight pieces
 SIMULATE = """
@@ -50,13 +52,6 @@ address, folder, experiment = sys.argv[1:]
 with RayEngine(address) as engine:
     compare(Experiment.model_validate_json(experiment), Path(folder, "runs"), engine, resources=Resources(cpus=1))
 """
-
-
-def wait_until(condition: Callable[[], object], timeout_s: float = 120) -> None:
-    end_s = time.monotonic() + timeout_s
-    while not condition():
-        assert time.monotonic() < end_s
-        time.sleep(0.01)
 
 
 def in_background(work: Callable[[], object]) -> threading.Thread:
@@ -100,7 +95,7 @@ def test_a_simulation_outlives_a_machine(
     cluster: TwoMachines, ray_engine: RayEngine, undisturbed: Path, tmp_path: Path
 ) -> None:
     thread = in_background(lambda: simulate_dataset(tmp_path / "data", SETTINGS, ray_engine))
-    wait_until(lambda: files(tmp_path, "0*.csv"))
+    wait_until(lambda: files(tmp_path, "0*.csv"), WAIT_S)
     cluster.lose_node()
     assert not (tmp_path / "data" / "manifest.csv").exists()
     thread.join()
@@ -112,7 +107,7 @@ def test_trainings_outlive_a_machine(
     cluster: TwoMachines, ray_engine: RayEngine, experiment: Experiment, undisturbed: Path, tmp_path: Path
 ) -> None:
     thread = in_background(lambda: compare(experiment, tmp_path / "runs", ray_engine, resources=ONE))
-    wait_until(lambda: len(files(tmp_path, "checkpoint.pt")) == 2)
+    wait_until(lambda: len(files(tmp_path, "checkpoint.pt")) == 2, WAIT_S)
     cluster.lose_node()
     assert not files(tmp_path, "metrics.json"), "both were running"
     thread.join()
@@ -122,7 +117,7 @@ def test_trainings_outlive_a_machine(
 
 def kill_program(script: str, arguments: list[str], started: Callable[[], object]) -> None:
     with subprocess.Popen([sys.executable, "-c", script, *arguments]) as program:
-        wait_until(lambda: started() or program.poll() is not None)
+        wait_until(lambda: started() or program.poll() is not None, WAIT_S)
         assert program.poll() is None
         program.kill()
 
@@ -184,7 +179,7 @@ def test_a_stopped_command_leaves_nothing_running(
     ]
     command[-1] += "from doorstate.cli import main; main()"
     with subprocess.Popen([*command, *line], cwd=tmp_path, stderr=subprocess.PIPE, text=True) as program:
-        wait_until(lambda: files(tmp_path, "0*.csv") or program.poll() is not None)
+        wait_until(lambda: files(tmp_path, "0*.csv") or program.poll() is not None, WAIT_S)
         assert program.poll() is None
         started = descendants(program.pid)
         program.send_signal(stop)

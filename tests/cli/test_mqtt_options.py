@@ -16,7 +16,8 @@ from doorstate.cli.mqtt_options import MqttOptions, read_mqtt_options
 from doorstate.errors import ConfigError
 from doorstate.io.pcd import write_pcd
 from doorstate.simulation.frames import Frame
-from tests.mqtt.broker import MOSQUITTO, PASSWORD, USER, Broker, listening, wait_until
+from tests.mqtt.broker import MOSQUITTO, PASSWORD, USER, Broker, listening
+from tests.waiting import wait_until
 
 Run = Callable[..., tuple[int, str, str]]
 STATE, AVAILABILITY = "doorstate/hall/door/state", "doorstate/hall/availability"

@@ -4,8 +4,6 @@
 from __future__ import annotations
 
 import os
-import time
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -14,13 +12,7 @@ from doorstate.doors.camera_place import CameraPlace, MissingPlace
 from doorstate.doors.pose_file import DEFAULTS
 from doorstate.doors.pose_stream import MAX_AGE_S, STANDARD_INPUT, PoseStream
 from doorstate.errors import DoorFileError
-
-
-def wait_until(is_so: Callable[[], object], timeout_s: float = 10.0) -> None:
-    end_s = time.monotonic() + timeout_s
-    while not is_so():
-        assert time.monotonic() < end_s, "waited in vain"
-        time.sleep(0.01)
+from tests.waiting import wait_until
 
 
 def place_at(poses: PoseStream, stamp_s: float) -> tuple[float, float, float]:

@@ -17,7 +17,8 @@ from doorstate.mqtt.publisher import MqttPublisher
 from doorstate.mqtt.settings import MqttSettings
 from doorstate.mqtt.status import DoorStatus
 from doorstate.types import DoorState
-from tests.mqtt.broker import PASSWORD, USER, Broker, listening, wait_until
+from tests.mqtt.broker import PASSWORD, USER, Broker, listening
+from tests.waiting import wait_until
 
 OPEN = DoorStatus("front", DoorState.OPEN, {"opening_angle_deg": 88.0})
 CLOSED = DoorStatus("front", DoorState.CLOSED)
