@@ -63,9 +63,21 @@ def test_a_state_is_forgotten_in_time_and_with_a_clock_that_goes_back() -> None:
     assert memory.at("lab", 1.0).state == OPEN
 
 
+def test_cameras_whose_stamps_differ_a_little_forget_nothing() -> None:
+    memory = knowing(door())
+    memory.update(doors(door("lab"), stamp_s=99.99), 0.1)
+    assert (memory.at("kitchen", 0.1).state, memory.at("lab", 0.1).state) == (OPEN, OPEN)
+
+
+def test_a_single_message_does_not_hold() -> None:
+    wait, memory = DoorWait(goal(timeout_s=5.0), 0.0), knowing(door())
+    assert [wait.step(memory, tenth / 10).reached for tenth in range(50)] == [None] * 50
+    assert wait.step(memory, 5.0).reached is False
+
+
 def test_a_door_that_is_not_seen_is_unknown_and_the_front_door_needs_no_name() -> None:
     memory = knowing(door(seen=False, reason="not seen: out of view"), door("", "CLOSED"))
-    assert memory.at("kitchen", 0.0) == of_memory.KnownDoor(reason="not seen: out of view")
+    assert memory.at("kitchen", 0.0) == of_memory.KnownDoor(reason="not seen: out of view", taken_s=0.0)
     assert memory.at(FRONT, 0.0).state == CLOSED
     memory.update(doors(reason="no message for 1 s"), 0.5)
     assert memory.at(FRONT, 0.5).reason == "no message for 1 s"

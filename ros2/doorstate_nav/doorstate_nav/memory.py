@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 UNKNOWN, CLOSED, SEMI_OPEN, OPEN = range(4)  # constants of Door.msg
 STATES = ("unknown", "closed", "semi_open", "open")
 EXPIRE_S = 2.0
+_BACK_S = 1.0  # by which stamps of several cameras may differ; clocks and recordings go back by more
 FRONT = ""  # the door most in front, where doors have no names
 
 
@@ -25,6 +26,7 @@ class KnownDoor(NamedTuple):
     passable_width_m: float = math.nan
     leaf_seen: bool = False
     reason: str = "never seen"
+    taken_s: float = -math.inf  # arrival of that message
 
 
 NEVER_SEEN = KnownDoor()
@@ -39,7 +41,7 @@ class DoorMemory:
 
     def __init__(self, expire_s: float = EXPIRE_S) -> None:
         self._expire_s = expire_s
-        self._doors: dict[str, tuple[KnownDoor, float]] = {}
+        self._doors: dict[str, KnownDoor] = {}
         self._updated_s = -math.inf
         self._stamp_s = -math.inf
 
@@ -52,15 +54,16 @@ class DoorMemory:
         """
         stamp = message.header.stamp
         stamp_s = stamp.sec + stamp.nanosec / 1e9
-        if stamp_s < self._stamp_s:
+        if stamp_s < self._stamp_s - _BACK_S:
             self._doors.clear()
-        self._stamp_s, self._updated_s = stamp_s, now_s
+            self._stamp_s = stamp_s
+        self._stamp_s, self._updated_s = max(stamp_s, self._stamp_s), now_s
         for door in message.doors:
             if door.id:
-                self._doors[door.id] = _known(door), now_s
+                self._doors[door.id] = _known(door)._replace(taken_s=now_s)
         seen = [door for door in message.doors if door.seen]
         front = _known(seen[0]) if seen else KnownDoor(reason=message.reason or "no door is in view")
-        self._doors[FRONT] = front, now_s
+        self._doors[FRONT] = front._replace(taken_s=now_s)
 
     def silent_s(self, now_s: float) -> float:
         """Return the time since the last message; infinite before the first."""
@@ -68,8 +71,10 @@ class DoorMemory:
 
     def at(self, door: str, now_s: float) -> KnownDoor:
         """Return a door now: unknown with the reason where its state is too old."""
-        known, taken_s = self._doors.get(door, (NEVER_SEEN, now_s))
-        age_s = now_s - taken_s
+        known = self._doors.get(door)
+        if known is None:
+            return NEVER_SEEN
+        age_s = now_s - known.taken_s
         if age_s < self._expire_s:
             return known
         return KnownDoor(reason=f"no word of this door for {age_s:.1f} s")

@@ -38,7 +38,7 @@ class DoorWait:
             if not (math.isfinite(value) and value >= 0):
                 raise ValueError(f"{name} {value}: expected a number that is not negative")
         self._goal, self._started_s = goal, now_s
-        self._since_s: float | None = None  # from when on the wanted state has held
+        self._since_s: float | None = None  # arrival of the message from which on the wanted state has held
         self._state_s = now_s
 
     def step(self, memory: DoorMemory, now_s: float) -> Progress:
@@ -55,8 +55,9 @@ class DoorWait:
         if reason:
             self._since_s = None
         elif self._since_s is None:
-            self._since_s = now_s
-        held_s = 0.0 if self._since_s is None else now_s - self._since_s
+            self._since_s = door.taken_s
+        # Only messages tell that a state holds, silence does not.
+        held_s = 0.0 if self._since_s is None else door.taken_s - self._since_s
         reached: bool | None = None
         if self._since_s is not None and held_s >= self._goal.hold_s:
             reached = True
