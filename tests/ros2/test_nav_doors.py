@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What Nav2 and Open-RMF are told of doors: never an old state, never open for what may be glass."""
+"""Doors for Nav2 and Open-RMF: no old state is reported, and no open door that may be glass."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ from doorstate_nav.memory import CLOSED, OPEN, STATES, UNKNOWN, DoorMemory, Know
 
 
 class Progress(NamedTuple):
-    """What is known while waiting, and at the end."""
+    """State of a wait: while it lasts, and at its end."""
 
     state: int
     held_s: float  # for which the wanted state has held
